@@ -85,7 +85,7 @@ pub struct CollideArgs {
     /// first order.
     #[arg(long)]
     pub all: bool,
-    /// What to do with the contacts
+    /// The treatment of the contacts
     #[command(flatten)]
     pub contacts: ContactArgs,
     /// The search options

@@ -5,7 +5,7 @@ use crate::meet::{Arrangement, arrangement};
 use crate::orientation::{plane_weights, volume_sign, weighted};
 use crate::triangle::{Corners, between, length};
 
-/// What two triangles have in common, as found by [`triangle_contact`].
+/// The common points of two triangles, as found by [`triangle_contact`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleContact {
     /// A common point: the middle of `ends`, or, of triangles in one plane, the mean of the corners

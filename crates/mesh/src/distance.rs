@@ -121,7 +121,7 @@ struct Face {
     along: [f64; 3],
     away: [f64; 3],
     base: f64,
-    /// Of the tip, in the frame.
+    /// The tip, in the frame.
     tip: [f64; 2],
 }
 

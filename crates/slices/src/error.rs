@@ -1,4 +1,4 @@
-//! Why no map is made.
+//! Errors of building a map.
 
 use nearmiss_geometry::Aabb;
 use nearmiss_store::WorkError;
@@ -6,105 +6,107 @@ use thiserror::Error;
 
 use crate::Up;
 
-/// Why no map is made of these points with these options.
+/// The reason why no map can be made of these points with these options.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SliceError {
-    /// Bounds of no points, with coordinates that are not finite, or so far apart that their distance is not.
+    /// The bounds are empty, not finite, or their extent is not finite.
     #[error(
-        "the bounds, {}, have no finite extent; give at least two points, all finite, and none too far away",
+        "expected at least two finite points at a finite distance, got bounds {}; remove points that are not finite \
+         or far off",
         corners(bounds)
     )]
     Bounds {
-        /// As given.
+        /// The given value.
         bounds: Aabb,
     },
-    /// All points at one height.
-    #[error("the points have no extent along {up}; name the axis that points up")]
+    /// All points have the same height.
+    #[error("expected points at different heights, got no extent along {up}; name the axis that points up")]
     Flat {
-        /// The direction upwards.
+        /// The axis that points up.
         up: Up,
     },
-    /// All points on one upright line.
+    /// All points are on one vertical line.
     #[error(
-        "the points have no extent across {up}, so a number of pixels gives no size; give a pixel's side"
+        "expected points with an extent across {up}, got a single vertical line; give the side of a pixel instead of \
+         a number of pixels"
     )]
     NoWidth {
-        /// The direction upwards.
+        /// The axis that points up.
         up: Up,
     },
-    /// A side that is none, or whose height of a slice by default, three times as much, is none.
-    #[error("a pixel of side {side:?} is none; give a length above 0, and not near the greatest number")]
+    /// The side of a pixel is not positive, or makes the height of a slice infinite.
+    #[error("expected a pixel side above 0 that leaves the height of a slice finite, got {side:?}")]
     Pixel {
-        /// As given.
+        /// The given value.
         side: f64,
     },
-    /// No pixels at all.
-    #[error("0 pixels along the longer side are none; give at least 1")]
+    /// The number of pixels along the longer side is 0.
+    #[error("expected at least 1 pixel along the longer side, got 0")]
     NoPixels,
-    /// A height that is none.
-    #[error("a slice of height {height:?} is none; give a length above 0")]
+    /// The height of a slice is not positive and finite.
+    #[error("expected a finite slice height above 0, got {height:?}")]
     SliceHeight {
-        /// As given.
+        /// The given value.
         height: f64,
     },
-    /// More pixels in a slice than can be told apart.
+    /// A slice would have too many pixels.
     #[error(
-        "a slice would have {pixels:.1e} pixels of side {side:?}, more than 2^31; the points reach {}: give larger pixels, or \
-         leave out points that lie far off",
+        "expected at most 2^31 pixels in a slice, got {pixels:.1e} of side {side:?} (points {}); give larger pixels, or \
+         remove points that are far off",
         corners(bounds)
     )]
     TooManyPixels {
-        /// How many.
+        /// The number of pixels.
         pixels: f64,
-        /// Their side.
+        /// The side of a pixel.
         side: f64,
-        /// Of the points.
+        /// The bounds of the points.
         bounds: Aabb,
     },
-    /// More memory than allowed.
+    /// The map needs more memory than allowed, or more slices than supported.
     #[error(
-        "{} slices of {} × {} pixels would take {} MiB while they are built, {} are allowed; the points reach {}: give larger \
-         pixels, higher slices, leave out points that lie far off, or allow more memory",
-        whole(*slices), pixels[0], pixels[1], whole((bytes / 1_048_576.0).ceil()), allowed >> 20, corners(bounds)
+        "expected to build the map in at most {} MiB, got {} slices of {} × {} pixels that take {} MiB (points {}); give larger \
+         pixels or higher slices, remove points that are far off, or allow more memory",
+        allowed >> 20, whole(*slices), pixels[0], pixels[1], whole((bytes / 1_048_576.0).ceil()), corners(bounds)
     )]
     Memory {
-        /// How many slices were asked for.
+        /// The number of slices.
         slices: f64,
-        /// Of each, its columns and rows.
+        /// Columns and rows of a slice.
         pixels: [u32; 2],
-        /// How much.
+        /// The bytes needed.
         bytes: f64,
-        /// The option.
+        /// The bytes allowed.
         allowed: u64,
-        /// Of the points.
+        /// The bounds of the points.
         bounds: Aabb,
     },
-    /// Memory that the system does not give, or a folder that fails.
+    /// Memory cannot be allocated, or the work folder fails.
     #[error(transparent)]
     Work(#[from] WorkError),
-    /// No share of a slice's height.
-    #[error("an obstacle share of {share:?} is none; give a number above 0")]
+    /// The obstacle share is not positive.
+    #[error("expected an obstacle share above 0, got {share:?}")]
     Share {
-        /// As given.
+        /// The given value.
         share: f64,
     },
-    /// No slope.
-    #[error("a slope of {degrees:?} degrees divides nothing; give one above 0 and below 90")]
+    /// The slope is not between 0 and 90 degrees.
+    #[error("expected a slope above 0 and below 90 degrees, got {degrees:?}")]
     Slope {
-        /// As given.
+        /// The given value.
         degrees: f64,
     },
-    /// No noise.
-    #[error("noise of {noise:?} is none; give a length of at least 0")]
+    /// The noise is negative or not finite.
+    #[error("expected a finite noise of at least 0, got {noise:?}")]
     Noise {
-        /// As given.
+        /// The given value.
         noise: f64,
     },
-    /// A rule by which even walls are floors.
+    /// The rule would make even walls floor.
     #[error(
-        "points would have to span {} of a slice's height to be an obstacle, which no wall does; give higher \
-         slices, a lesser slope or less noise", short(*share)
+        "expected an obstacle share below 1, got {} (no wall spans that much of a slice); give higher slices, a \
+         lesser slope or less noise", short(*share)
     )]
     NoObstacles {
         /// ε.
@@ -112,17 +114,17 @@ pub enum SliceError {
     },
 }
 
-/// So that a point far off is seen.
+/// The corners of the bounds, which reveal a point far off.
 fn corners(Aabb { min, max }: &Aabb) -> String {
     format!("from {min:?} to {max:?}")
 }
 
-/// A whole number, by its power of ten where nobody would count digits.
+/// Formats a whole number, in scientific notation from 1e15.
 fn whole(x: f64) -> String {
     if x.abs() < 1e15 { format!("{x:.0}") } else { format!("{x:.1e}") }
 }
 
-/// A number with two decimals, as [`whole`].
+/// Formats a number with two decimals, in scientific notation from 1e15.
 fn short(x: f64) -> String {
     if x.abs() < 1e15 { format!("{x:.2}") } else { format!("{x:.1e}") }
 }

@@ -1,4 +1,4 @@
-//! The storeys of a building: heights at which much floor lies with room to stand above it.
+//! The storeys of a building: heights with much floor and headroom above it.
 
 use std::ops::Range;
 
@@ -14,10 +14,10 @@ pub struct Storey {
     /// Median height of its floor, in the map's coordinates
     /// ([`Up::coordinate`](crate::Up::coordinate) returns the caller's).
     pub height: f64,
-    /// Area of its floor that has headroom, in square units of the input.
+    /// Area of its floor with headroom, in square units of the input.
     pub area: f64,
-    /// Heights of feet that belong to it, in the map's coordinates; half open. Those of all storeys
-    /// cover every height: stairs belong to the storey that they leave upwards.
+    /// Heights of feet that belong to it, in the map's coordinates; half open. The ranges of all
+    /// storeys cover every height. Stairs belong to the storey below them.
     pub heights: [f64; 2],
 }
 
@@ -30,21 +30,21 @@ const MOST_BINS: f64 = 4_194_304.0;
 /// A storey has at least this share of the area of the largest one.
 const LEAST_SHARE: f64 = 0.1;
 
-/// A level above the lowest is a storey if what rises from it, per slice, covers at least this
-/// share of it: on a roof, or on a ceiling that was scanned from below, nothing does.
+/// A level above the lowest is a storey if the things that rise from it cover at least this share
+/// of it, per slice. Nothing rises from a roof, or from a ceiling that was scanned from below.
 const LEAST_ABOVE: f64 = 0.001;
 
 impl SliceMap {
     /// Finds the storeys, lowest first, with the headroom that the avatar's height needs.
     ///
-    /// Floor is what is no obstacle and has nothing above it up to the height of the avatar. The
-    /// height with the most floor within one climb is a storey; so is, in turn, the next one that
-    /// is at least the avatar's height away from all others and has a tenth of the area of the
-    /// largest or more. Levels from which nothing rises are roofs, not storeys. Looks at every
-    /// pixel of every slice once.
+    /// A pixel is floor if it is no obstacle and has nothing above it up to the height of the
+    /// avatar. The height with the most floor within one climb is a storey. So is, in turn, the
+    /// next one that is at least the avatar's height away from all others and has at least a tenth
+    /// of the area of the largest. Levels from which nothing rises are roofs, not storeys. Visits
+    /// every pixel of every slice once.
     ///
     /// # Errors
-    /// When a slice is not loaded.
+    /// If a slice is not loaded.
     pub fn storeys(&self, avatar: &Avatar) -> Result<Vec<Storey>, Unloaded> {
         let mut floor = FloorCount::new(self.grid(), avatar);
         for s in (0..self.grid().counts[2]).rev() {
@@ -55,11 +55,11 @@ impl SliceMap {
 }
 
 impl SliceFolder {
-    /// Finds the storeys as [`SliceMap::storeys`] does, with one slice in memory at a time, and 8
+    /// Finds the storeys as [`SliceMap::storeys`] does, with one slice in memory at a time and 8
     /// bytes a pixel.
     ///
     /// # Errors
-    /// Names the file of a slice that cannot be loaded.
+    /// If a slice cannot be loaded; the error names its file.
     pub fn storeys(&self, avatar: &Avatar) -> Result<Vec<Storey>, StoreError> {
         let mut floor = FloorCount::new(self.grid(), avatar);
         for s in (0..self.grid().counts[2]).rev() {
@@ -80,7 +80,7 @@ struct FloorCount {
     bins: Vec<u64>,
     /// Height of the lowest thing above, for each pixel.
     ceilings: Vec<f64>,
-    /// Pixels that hold something, for each slice.
+    /// Number of occupied pixels of each slice.
     filled: Vec<u64>,
 }
 
@@ -100,7 +100,7 @@ impl FloorCount {
         }
     }
 
-    /// Takes in a slice; the highest first.
+    /// Adds a slice; the highest must come first.
     fn add(&mut self, s: u32, slice: &Slice) {
         let [columns, rows, _] = self.grid.counts;
         self.filled[s as usize] = slice.counts()[0];
@@ -121,7 +121,7 @@ impl FloorCount {
         }
     }
 
-    /// The storeys, when all slices are taken in.
+    /// Returns the storeys, once all slices are added.
     fn storeys(mut self) -> Vec<Storey> {
         let half = whole(0.5 * self.climb / self.fine);
         let apart = whole(self.headroom / self.fine).max(2 * half);
@@ -153,7 +153,7 @@ impl FloorCount {
         storeys
     }
 
-    /// The bins around one, as far as they are there.
+    /// Returns the existing bins around one.
     fn about(&self, middle: usize, half: usize) -> Range<usize> {
         middle.saturating_sub(half)..(middle + half + 1).min(self.bins.len())
     }
@@ -175,8 +175,8 @@ pub fn storey_of(storeys: &[Storey], feet: f64) -> Option<usize> {
     storeys.iter().position(|storey| storey.heights[0] <= feet && feet < storey.heights[1])
 }
 
-/// Returns the middle of the window of `2·half + 1` bins that holds most; `None` if all bins are
-/// empty. Of several the lowest.
+/// Returns the middle of the fullest window of `2·half + 1` bins; `None` if all bins are empty. Of
+/// several windows the lowest wins.
 fn fullest(bins: &[u64], half: usize) -> Option<usize> {
     let mut sum: u64 = bins.iter().take(half).sum();
     let (mut best, mut most) = (None, 0);
@@ -192,7 +192,7 @@ fn fullest(bins: &[u64], half: usize) -> Option<usize> {
     best
 }
 
-/// Returns the bin that half of what bins hold lies below.
+/// Returns the bin of the median.
 fn median(bins: &[u64]) -> usize {
     let all: u64 = bins.iter().sum();
     let mut below = 0;

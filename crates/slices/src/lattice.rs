@@ -6,15 +6,15 @@ use crate::{Avatar, Grid};
 /// number.
 const TOLERANCE: f64 = 0.01;
 
-/// Places at equal distances along both axes across, as far as a base there meets the map.
+/// Equidistant places along both horizontal axes, as far as a base there meets the map.
 ///
-/// A base of side `b` over pixels of side `t` covers `⌊b/t⌋ + 1` or one more of them along an axis,
-/// as it lies. The places are the middles of blocks of the lesser number, so an avatar passes every
-/// gap that it can pass at all, provided that the spacing is a pixel or a whole part of it. They
-/// depend on the map and the avatar alone.
+/// A base of side `b` over pixels of side `t` covers `⌊b/t⌋ + 1` of them along an axis or one more,
+/// depending on its position. The places are the centres of blocks of the lesser number. So an
+/// avatar passes every gap that it can pass at all, provided that the spacing is a pixel or a whole
+/// part of it. The places depend on the map and the avatar alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepGrid {
-    /// The place of column 0 and row 0, across in the map's coordinates.
+    /// The place of column 0 and row 0, in the map's horizontal coordinates.
     pub origin: [f64; 2],
     /// Distance between neighbours along an axis.
     pub spacing: f64,
@@ -41,13 +41,13 @@ impl StepGrid {
         Self { origin: [x, y], spacing, counts: [columns, rows] }
     }
 
-    /// Returns the place of a column and a row, across in the map's coordinates.
+    /// Returns the place of a column and a row, in the map's horizontal coordinates.
     #[must_use]
     pub fn place(&self, cell: [u32; 2]) -> [f64; 2] {
         [0, 1].map(|k| self.origin[k] + f64::from(cell[k]) * self.spacing)
     }
 
-    /// Returns the column and the row of the place nearest to `place`, across in the map's
+    /// Returns the column and the row of the place nearest to `place`, in the map's horizontal
     /// coordinates.
     pub(crate) fn nearest(&self, place: [f64; 2]) -> [u32; 2] {
         [0, 1].map(|k| self.clamped(k, ((place[k] - self.origin[k]) / self.spacing).round()))

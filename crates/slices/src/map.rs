@@ -1,4 +1,4 @@
-//! The map: slices over a lattice, those that are equal kept once.
+//! The map: slices over a lattice, equal ones stored once.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,62 +10,65 @@ use crate::options::{MOST_SHARE, Obstacle};
 use crate::slice::Slice;
 use crate::{Block, Grid};
 
-/// Slices of a building, lowest first. Equal ones share their memory; those that are not loaded are missing.
+/// The slices of a building, lowest first. Equal slices share their memory; slices that are not
+/// loaded are missing.
 ///
-/// A clone costs a reference count a slice.
+/// A clone costs one reference count a slice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SliceMap {
     index: Index,
     slices: Vec<Option<Arc<Slice>>>,
 }
 
-/// What is known of a map without any of its slices.
+/// The data of a map without its slices.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Index {
     pub(crate) grid: Grid,
     pub(crate) about: About,
 }
 
-/// What a map was made of.
+/// The origin of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct About {
-    /// The rule as it was asked for.
+    /// The rule as given.
     pub rule: Obstacle,
     /// ε: a voxel whose points span more than ε σ is an obstacle.
     pub share: f64,
-    /// How far points of a level floor spread upwards within a pixel, as far as ε allows for it: as given, or
-    /// estimated, which is 0 where nothing could be told; and 0 where the rule is ε itself.
+    /// Height that the points of a level floor spread over within a pixel, as far as ε allows for
+    /// it. Given or estimated; 0 if it could not be estimated, or if ε was given directly.
     pub noise: f64,
-    /// How many points are in it.
+    /// The number of points.
     pub points: u64,
-    /// How many points were left out ([`SliceBuilder::counts`](crate::SliceBuilder::counts)).
+    /// The number of points that were left out
+    /// ([`SliceBuilder::counts`](crate::SliceBuilder::counts)).
     pub left_out: u64,
 }
 
 impl About {
-    /// Whether the noise was estimated from the points.
+    /// Returns `true` if the noise was estimated from the points.
     #[must_use]
     pub fn is_noise_estimated(&self) -> bool {
         matches!(self.rule, Obstacle::Slope { noise: None, .. })
     }
 
-    /// Whether the noise is so great that ε does not allow for all of it ([`Obstacle::Slope`]).
+    /// Returns `true` if the noise is so great that ε does not allow for all of it
+    /// ([`Obstacle::Slope`]).
     #[must_use]
     pub fn is_noise_capped(&self) -> bool {
         self.is_noise_estimated() && self.noise > 0.0 && self.share >= MOST_SHARE
     }
 }
 
-/// A slice that would be needed is not there.
+/// A required slice is not loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("slice {slice} is needed and not loaded")]
 pub struct Unloaded {
-    /// Which, counted from the lowest.
+    /// The slice, counted from the lowest.
     pub slice: u32,
 }
 
 impl SliceMap {
-    /// A map of all its slices, equal ones joined.
+    /// Creates a map of all slices; equal ones share memory.
     pub(crate) fn of_slices(index: Index, slices: Vec<Slice>) -> Self {
         let mut known: BTreeMap<u64, Arc<Slice>> = BTreeMap::new();
         let slices = slices.into_iter().map(|slice| {
@@ -76,7 +79,7 @@ impl SliceMap {
         Self { index, slices: slices.collect() }
     }
 
-    /// A map none of whose slices is loaded.
+    /// Creates a map without loaded slices.
     pub(crate) fn unloaded(index: Index) -> Self {
         Self { index, slices: vec![None; index.grid.counts[2] as usize] }
     }
@@ -85,42 +88,42 @@ impl SliceMap {
         &self.index
     }
 
-    /// Puts a slice in its place, or takes it out.
+    /// Sets a slice, or removes it.
     pub(crate) fn put(&mut self, slice: u32, image: Option<Arc<Slice>>) {
         self.slices[slice as usize] = image;
     }
 
-    /// Where pixels and slices lie.
+    /// Returns the grid of pixels and slices.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.index.grid
     }
 
-    /// What it was made of.
+    /// Returns its origin: the rule, noise and number of points.
     #[must_use]
     pub fn about(&self) -> &About {
         &self.index.about
     }
 
-    /// All slices, lowest first; missing ones are not loaded.
+    /// Returns all slices, lowest first; `None` for those not loaded.
     #[must_use]
     pub fn slices(&self) -> &[Option<Arc<Slice>>] {
         &self.slices
     }
 
-    /// One of them.
+    /// Returns a slice.
     ///
     /// # Errors
-    /// When it is not loaded.
+    /// If the slice is not loaded.
     ///
     /// # Panics
-    /// When there is no such slice.
+    /// If there is no such slice.
     #[inline]
     pub fn slice(&self, slice: u32) -> Result<&Arc<Slice>, Unloaded> {
         self.slices[slice as usize].as_ref().ok_or(Unloaded { slice })
     }
 
-    /// How many of the loaded slices differ.
+    /// Returns the number of distinct loaded slices.
     #[must_use]
     pub fn distinct(&self) -> usize {
         let mut known: Vec<*const Slice> = self.slices.iter().flatten().map(Arc::as_ptr).collect();
@@ -129,13 +132,14 @@ impl SliceMap {
         known.len()
     }
 
-    /// Bytes that the loaded slices take.
+    /// Returns the bytes of the loaded slices.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.distinct() * self.slices.iter().flatten().map(|slice| slice.bytes()).max().unwrap_or(0)
     }
 
-    /// The slices of a block, lowest first, each with whether it is the same as the one before.
+    /// Returns the slices of a block, lowest first, each with `true` if it is the same as the one
+    /// before.
     #[inline]
     pub(crate) fn runs(&self, block: &Block) -> impl Iterator<Item = Result<(u32, &Slice, bool), Unloaded>> {
         let mut before: *const Slice = std::ptr::null();

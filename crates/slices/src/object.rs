@@ -16,7 +16,7 @@ const UPRIGHT: f64 = 1e-6;
 pub enum ObjectError {
     /// The pose tilts the object.
     #[error(
-        "the pose tilts the object's axis by {degrees} degrees; turn it about the axis that points up only"
+        "expected a pose that turns about the axis that points up only, got a tilt of {degrees} degrees"
     )]
     Tilted {
         /// Angle between the posed axis and the building's.

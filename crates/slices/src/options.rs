@@ -1,4 +1,4 @@
-//! How a map is made: what is asked, checked against the bounds of the points.
+//! Options of a map, checked against the bounds of the points.
 
 use nearmiss_geometry::Aabb;
 use serde::{Deserialize, Serialize};
@@ -8,19 +8,20 @@ use crate::layer::{BLOCKS, Layer, PART};
 use crate::slice::Slice;
 use crate::{Grid, Up};
 
-/// Pixels of a slice, and slices, that can be told apart.
+/// Greatest number of pixels of a slice, and of slices.
 const MOST: f64 = 2_147_483_648.0;
 
-/// However noisy points are, what spans more than this share of a slice is an obstacle.
+/// Limit of ε for estimated noise: a voxel whose points span more than this share of a slice is
+/// always an obstacle.
 pub(crate) const MOST_SHARE: f64 = 0.9;
 
-/// Bytes that allocators take beside what a slice is given, in eight pieces: sixteen each, and as much lost
-/// to rounding.
+/// Overhead of the allocator for the eight allocations of a slice: sixteen bytes each, and as much
+/// lost to rounding.
 const ALLOCATIONS: usize = 8 * 32;
 
-/// Most bytes that a slice of so many pixels takes while a map is built: what its voxels have seen, the image
-/// made of that, its places in lists of slices, where each block of points begins in each of its parts, and
-/// what the system adds.
+/// Returns the greatest number of bytes that a slice of this size needs while a map is built: its
+/// voxels, its image, its places in lists of slices, the start of each block of points in each of
+/// its parts, and the overhead of the allocator.
 fn bytes([width, height]: [u32; 2]) -> usize {
     let area = width as usize * height as usize;
     let lists = 2 * size_of::<Slice>() + 4 * size_of::<usize>();
@@ -28,56 +29,57 @@ fn bytes([width, height]: [u32; 2]) -> usize {
     Layer::bytes_of(area) + Slice::bytes_of(width, height) + lists + blocks + ALLOCATIONS
 }
 
-/// Bytes that it takes to make a slice of voxels on disk and to write it: the image, and what it is encoded
-/// to.
+/// Returns the bytes that are needed to make and write a slice whose voxels are on disk: the image
+/// and its encoding.
 fn bytes_on_disk([width, height]: [u32; 2]) -> usize {
     2 * Slice::bytes_of(width, height)
 }
 
-/// More slices than this are not made on disk: each takes two files.
+/// Greatest number of slices on disk; each takes two files.
 const MOST_ON_DISK: f64 = 10_000.0;
 
-/// How large a pixel is.
+/// The size of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Pixel {
     /// t, in the units of the points.
     Side(f64),
-    /// So many pixels along the longer side of the bounds.
+    /// Number of pixels along the longer side of the bounds.
     Count(u32),
 }
 
-/// When a voxel is an obstacle: if the points in it span more than ε σ upwards.
+/// The rule for obstacles: a voxel is one if its points span more than ε σ upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Obstacle {
-    /// ε itself. The paper has 0.07, which with σ = 3 t calls everything an obstacle that is steeper than
-    /// 11.9°.
+    /// ε itself. The value of Anjos et al. 2012 is 0.07, which with σ = 3 t makes everything
+    /// steeper than 11.9° an obstacle.
     Share(f64),
-    /// ε = (t·tan θ + noise)/σ, so that what climbs along an axis at θ is still floor.
+    /// ε = (t·tan θ + noise)/σ, so that a surface with slope θ along an axis is still floor.
     Slope {
         /// θ, above 0 and below 90 degrees.
         degrees: f64,
-        /// How far points of a level floor spread upwards within a pixel, in the units of the points;
-        /// estimated from the points if not given. What is estimated makes ε no more than 0.9, however noisy
-        /// the points: else walls would become floors
-        /// ([`About::is_noise_capped`](crate::About::is_noise_capped) tells).
+        /// Height that the points of a level floor spread over within a pixel, in the units of the
+        /// points; estimated from the points if `None`. Estimated noise makes ε at most 0.9, since
+        /// otherwise walls would become floors
+        /// ([`About::is_noise_capped`](crate::About::is_noise_capped)).
         noise: Option<f64>,
     },
 }
 
-/// How a map is made. Plain numbers, checked by [`SlicePlan::new`], and without points by
+/// Options of a map. Plain numbers, checked by [`SlicePlan::new`], or without points by
 /// [`SliceOptions::check`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SliceOptions {
-    /// Size of a pixel. Default: 700 along the longer side, as in the paper.
+    /// Size of a pixel. Default: 700 along the longer side, as in Anjos et al. 2012.
     pub pixel: Pixel,
-    /// σ; three times t if not given, as in the paper.
+    /// σ, the height of a slice; `None` for three times t, as in Anjos et al. 2012.
     pub slice_height: Option<f64>,
-    /// What is an obstacle. Default: steeper than 45°, noise estimated.
+    /// The rule for obstacles. Default: steeper than 45°, noise estimated.
     pub obstacle: Obstacle,
-    /// Which way is up. Default: z.
+    /// The axis that points up. Default: z.
     pub up: Up,
-    /// The most bytes that building may take, refused beforehand if more are needed. Default: 4 GiB.
+    /// Greatest number of bytes for building; options that need more are rejected beforehand.
+    /// Default: 4 GiB.
     pub memory: u64,
 }
 
@@ -94,40 +96,41 @@ impl Default for SliceOptions {
 }
 
 impl SliceOptions {
-    /// The same options with this size of a pixel.
+    /// Sets the size of a pixel.
     #[must_use]
     pub const fn with_pixel(self, pixel: Pixel) -> Self {
         Self { pixel, ..self }
     }
 
-    /// The same options with this height of a slice.
+    /// Sets the height of a slice.
     #[must_use]
     pub const fn with_slice_height(self, slice_height: Option<f64>) -> Self {
         Self { slice_height, ..self }
     }
 
-    /// The same options with this rule.
+    /// Sets the rule for obstacles.
     #[must_use]
     pub const fn with_obstacle(self, obstacle: Obstacle) -> Self {
         Self { obstacle, ..self }
     }
 
-    /// The same options with this direction upwards.
+    /// Sets the axis that points up.
     #[must_use]
     pub const fn with_up(self, up: Up) -> Self {
         Self { up, ..self }
     }
 
-    /// The same options with this many bytes allowed.
+    /// Sets the number of allowed bytes.
     #[must_use]
     pub const fn with_memory(self, memory: u64) -> Self {
         Self { memory, ..self }
     }
 
-    /// Checks what makes no sense whatever the points: before they are read.
+    /// Checks everything that does not depend on the points, so that errors show before the points
+    /// are read.
     ///
     /// # Errors
-    /// Names the option.
+    /// If an option is invalid; the error names it.
     pub fn check(&self) -> Result<(), SliceError> {
         match self.pixel {
             Pixel::Side(t) if !(t > 0.0 && self.height(t).is_finite()) => {
@@ -152,14 +155,14 @@ impl SliceOptions {
             }
             rule => match (self.pixel, self.slice_height) {
                 (Pixel::Side(t), _) => rule.check(t, self.height(t)),
-                // t is not known yet, but that it is a third of σ, or more than nothing.
+                // t is not known yet: it is a third of σ, or just positive.
                 (Pixel::Count(_), None) => rule.without_noise().check(1.0, self.height(1.0)),
                 (Pixel::Count(_), Some(height)) => rule.check(0.0, height),
             },
         }
     }
 
-    /// σ for this t.
+    /// Returns σ for this t.
     fn height(&self, pixel: f64) -> f64 {
         self.slice_height.unwrap_or(3.0 * pixel)
     }
@@ -173,7 +176,8 @@ impl Obstacle {
         }
     }
 
-    /// ε, where noise that was not given is this; it alone never makes ε more than [`MOST_SHARE`].
+    /// Returns ε, with `estimated` for noise that was not given. Estimated noise alone never makes
+    /// ε more than [`MOST_SHARE`].
     fn share(self, pixel: f64, slice_height: f64, estimated: f64) -> f64 {
         match self {
             Self::Share(share) => share,
@@ -185,39 +189,39 @@ impl Obstacle {
         }
     }
 
-    /// The points of a voxel span less than σ.
+    /// Checks that ε is below 1: the points of a voxel span less than σ.
     fn check(self, pixel: f64, slice_height: f64) -> Result<(), SliceError> {
         let share = self.share(pixel, slice_height, 0.0);
         if share < 1.0 { Ok(()) } else { Err(SliceError::NoObstacles { share }) }
     }
 }
 
-/// Options that make sense, and the lattice that they make over given bounds.
+/// Validated options, and the lattice that they give for the bounds of the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlicePlan {
     grid: Grid,
     obstacle: Obstacle,
-    /// How many slices may be made at a time.
+    /// Number of slices that may be made at a time.
     together: usize,
 }
 
 impl SlicePlan {
-    /// Checks the options against the bounds of the points, in the caller's coordinates. Nothing is
-    /// allocated.
+    /// Checks the options against the bounds of the points, in the caller's coordinates, without
+    /// allocating.
     ///
     /// # Errors
-    /// Names the option that makes no sense, or what of the bounds does not serve; says how many bytes are
-    /// needed where more are than allowed.
+    /// If an option is invalid, the bounds are invalid, or more bytes are needed than allowed; the
+    /// error names the option or the bounds, and the bytes.
     pub fn new(options: &SliceOptions, bounds: &Aabb) -> Result<Self, SliceError> {
         Self::of(options, bounds, false)
     }
 
-    /// As [`Self::new`], for a builder whose voxels lie on disk ([`SliceBuilder::new_in`]), and whose slices
-    /// are [written](crate::SliceTarget::build) as they are made: only a few of them have to fit into the
-    /// bytes that are allowed.
+    /// Checks like [`Self::new`], for a builder whose voxels are on disk ([`SliceBuilder::new_in`])
+    /// and whose slices are [written](crate::SliceTarget::build) as they are made. Only a few of
+    /// the slices must fit into the allowed bytes.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// As for [`Self::new`].
     ///
     /// [`SliceBuilder::new_in`]: crate::SliceBuilder::new_in
     pub fn on_disk(options: &SliceOptions, bounds: &Aabb) -> Result<Self, SliceError> {
@@ -238,7 +242,7 @@ impl SlicePlan {
         }
         let pixel = match options.pixel {
             Pixel::Side(t) => t,
-            // So much longer that the farthest point still lies in the last pixel.
+            // Slightly longer, so that the farthest point is within the last pixel.
             Pixel::Count(n) => extent[0].max(extent[1]) / f64::from(n) * (1.0 + 1e-9),
         };
         if pixel <= 0.0 {
@@ -264,7 +268,7 @@ impl SlicePlan {
         let [width, height, _] = counts;
         #[expect(clippy::cast_precision_loss, reason = "a limit of memory needs no more digits")]
         let (bytes, allowed, most) = if on_disk {
-            // Two of them, so that two cores are busy; the rest is for the pages of the voxels.
+            // Two slices, so that two cores are busy; the rest is for the pages of the voxels.
             (4.0 * bytes_on_disk([width, height]) as f64, options.memory as f64, MOST_ON_DISK)
         } else {
             (slices * bytes([width, height]) as f64, options.memory as f64, MOST)
@@ -285,24 +289,24 @@ impl SlicePlan {
         Ok(Self { grid, obstacle: options.obstacle, together })
     }
 
-    /// The lattice.
+    /// Returns the lattice.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// The rule as it was asked for.
+    /// Returns the rule as given.
     #[must_use]
     pub fn obstacle(&self) -> Obstacle {
         self.obstacle
     }
 
-    /// How many slices may be made at a time.
+    /// Number of slices that may be made at a time.
     pub(crate) fn together(&self) -> usize {
         self.together
     }
 
-    /// ε, where noise that was not given is this.
+    /// Returns ε, with `estimated` for noise that was not given.
     pub(crate) fn share(&self, estimated: f64) -> f64 {
         self.obstacle.share(self.grid.pixel, self.grid.slice_height, estimated)
     }

@@ -1,7 +1,8 @@
-//! A box against the slices: does it touch anything, is that an obstacle, how high is the floor below?
+//! Queries of boxes: collision, obstacles and the floor below.
 //!
-//! S4, §3.1: the pixels under the box in every slice between its bottom and its top; O(pixels · slices).
-//! Where the paper counts size/t pixels about the centre, these are all that the closed box meets.
+//! The pixels under the box in every slice between its bottom and its top (Anjos et al. 2012,
+//! §3.1); O(pixels · slices). The paper counts size/t pixels about the centre; here all pixels
+//! count that the closed box meets.
 
 use std::ops::RangeInclusive;
 
@@ -13,47 +14,48 @@ use crate::bits::Run;
 use crate::map::{SliceMap, Unloaded};
 use crate::{Block, Grid};
 
-/// Questions that a thread takes at a time.
+/// Queries that a thread takes at a time.
 const CHUNK: usize = 64;
 
-/// Rows that are looked at together for floors: of slices that are empty there only tiles are.
+/// Rows that are searched together for floors: slices that are empty there cost only a look at the
+/// tiles.
 const BAND: u32 = 32;
 
-/// What the floor under a base is, where it is not level (S4, §3.1).
+/// The floor under a base that is not level (Anjos et al. 2012, §3.1).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Floor {
-    /// The highest.
+    /// The highest pixel.
     #[default]
     Max,
-    /// The mean of those pixels that have one.
+    /// The mean of the pixels that have a floor.
     Mean,
 }
 
-/// What is in a box.
+/// The content of a box.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {
-    /// Whether any pixel holds something.
+    /// `true` if any pixel is occupied.
     pub collides: bool,
-    /// Whether any pixel is an obstacle.
+    /// `true` if any pixel is an obstacle.
     pub obstacle: bool,
     /// The floor under the base, as the caller's coordinate along the axis that points up.
     pub floor: Option<f64>,
-    /// How many pixels hold something.
+    /// The number of occupied pixels.
     pub pixels: u64,
 }
 
 impl Grid {
-    /// The voxels that a closed box of the caller's coordinates meets; none if it is empty, has a bound that
-    /// is not a number, or lies outside.
+    /// Returns the voxels that a closed box of the caller's coordinates meets. Returns `None` if
+    /// the box is empty, has a NaN bound, or is outside the map.
     #[must_use]
     pub fn block_of(&self, bounds: &Aabb) -> Option<Block> {
         let [min, max] = self.turned(bounds)?;
         self.block(min, max)
     }
 
-    /// The box in the map's coordinates; none if it is empty.
+    /// Returns the box in the map's coordinates; `None` if it is empty.
     fn turned(&self, bounds: &Aabb) -> Option<[[f64; 3]; 2]> {
-        // Written so that what is not a number is empty.
+        // The form of the condition also rejects NaN.
         if !(0..3).all(|k| bounds.min[k] <= bounds.max[k]) {
             return None;
         }
@@ -63,14 +65,14 @@ impl Grid {
 }
 
 impl SliceMap {
-    /// Whether a box, in the caller's coordinates, meets a pixel that holds something. An empty box meets
-    /// none.
+    /// Returns `true` if a box, in the caller's coordinates, meets an occupied pixel. An empty box
+    /// meets none.
     ///
-    /// Equal slices in a row are looked at once (S4, §5). Some hundred nanoseconds for an avatar of 15 × 15 ×
-    /// 15 pixels.
+    /// Equal adjacent slices are tested once (Anjos et al. 2012, §5). Takes some hundred
+    /// nanoseconds for an avatar of 15 × 15 × 15 pixels.
     ///
     /// # Errors
-    /// When a slice that is needed is not loaded.
+    /// If a required slice is not loaded.
     pub fn touches(&self, bounds: &Aabb) -> Result<bool, Unloaded> {
         let Some(block) = self.grid().block_of(bounds) else { return Ok(false) };
         for run in self.runs(&block) {
@@ -82,13 +84,14 @@ impl SliceMap {
         Ok(false)
     }
 
-    /// What is in a box of the caller's coordinates, and how high the floor is below it.
+    /// Returns the content of a box of the caller's coordinates, and the height of the floor below
+    /// it.
     ///
-    /// The floor of a pixel under the base is the highest thing in its column in the slice of the base or
-    /// lower, unless that is an obstacle.
+    /// The floor of a pixel under the base is the highest occupied voxel of its column in the slice
+    /// of the base or lower, unless that is an obstacle.
     ///
     /// # Errors
-    /// When a slice that is needed is not loaded; the floor may need any slice below the box.
+    /// If a required slice is not loaded; the floor may require any slice below the box.
     pub fn query(&self, bounds: &Aabb, floor: Floor) -> Result<Occupancy, Unloaded> {
         let mut found = Occupancy::default();
         let Some([min, max]) = self.grid().turned(bounds) else { return Ok(found) };
@@ -113,17 +116,17 @@ impl SliceMap {
         Ok(found)
     }
 
-    /// Answers every question, on all cores with the feature `rayon`.
+    /// Answers every query, on all cores with the feature `rayon`.
     ///
     /// # Panics
-    /// When there are not as many answers as boxes.
+    /// If the number of answers is not that of the boxes.
     pub fn query_each(&self, boxes: &[Aabb], floor: Floor, answers: &mut [Result<Occupancy, Unloaded>]) {
         assert_eq!(boxes.len(), answers.len(), "an answer a box");
         change_each(answers, CHUNK, |i, answer| *answer = self.query(&boxes[i], floor));
     }
 
-    /// Adds, for each column, the height in the map's coordinates of the highest thing in the slice of `base`
-    /// or lower, unless it is an obstacle.
+    /// Adds the floor of each column: the height of its highest occupied voxel in the slice of
+    /// `base` or lower, in the map's coordinates, unless that is an obstacle.
     pub(crate) fn floors_below(
         &self,
         columns: &RangeInclusive<u32>,
@@ -145,7 +148,7 @@ impl SliceMap {
         Ok(())
     }
 
-    /// Those of so many of the lowest `slices`, for some rows and columns of one word.
+    /// Adds the floors among the lowest `slices`, for some rows and the columns of one word.
     fn floors_of_band(
         &self,
         slices: u32,
@@ -154,7 +157,7 @@ impl SliceMap {
         floors: &mut Floors,
     ) -> Result<(), Unloaded> {
         let word = columns.start() / 64;
-        // Columns whose highest thing has not been found yet.
+        // Columns whose highest occupied voxel has not been found yet.
         let mut open = [Run::new(columns).mask(word as usize); BAND as usize];
         let open = &mut open[..band.clone().count()];
         for s in (0..slices).rev() {
@@ -180,7 +183,7 @@ impl SliceMap {
     }
 }
 
-/// Heights of floors, put together.
+/// Maximum and mean of heights of floors.
 #[derive(Debug, Default)]
 pub(crate) struct Floors {
     sum: f64,

@@ -1,8 +1,7 @@
-//! The reach of an avatar: all places that it can walk to, found by a flood fill over its own
+//! The reach of an avatar: all places that it can walk to, found by a flood fill over the walker's
 //! steps.
 //!
-//! R. K. dos Anjos, J. M. Pereira, J. F. Oliveira, WSCG 2012 (S4), gives the steps; the fill is
-//! plain.
+//! The steps follow R. K. dos Anjos, J. M. Pereira, J. F. Oliveira, WSCG 2012.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +17,7 @@ use crate::walk::Walker;
 use crate::walk_error::WalkError;
 use crate::{Grid, Up};
 
-/// What an avatar can walk to from a start.
+/// The places that an avatar can walk to from a start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reach {
     up: Up,
@@ -30,25 +29,25 @@ pub struct Reach {
 /// The part of a reach that lies on a storey.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Covered {
-    /// Places of the lattice; one above another on the same storey counts once.
+    /// Number of places of the lattice; places above each other on the same storey count once.
     pub places: u64,
     /// Their area, in square units of the input.
     pub area: f64,
 }
 
 impl Reach {
-    /// Finds the reach of a walker that stands somewhere.
+    /// Finds the reach of a walker.
     ///
     /// The places are those of the [`StepGrid`] whose spacing is the avatar's step, at the heights
-    /// at which the avatar comes to them. From the start the avatar walks to the corners of its
-    /// cell, then from each place to its eight neighbours, by [`Walker::step`]. With `falls` it
-    /// also goes where it falls and lands on something; without, only where something carries it at
-    /// every step.
+    /// at which the avatar arrives there. From the start the avatar walks to the corners of its
+    /// cell, then from each place to its eight neighbours, by [`Walker::step`]. Without `falls` it
+    /// walks only where something supports it at every step. With `falls` it may also fall, if it
+    /// lands on something.
     ///
     /// Takes about ten steps of a walker for each place and each footing of it.
     ///
     /// # Errors
-    /// When there are more than 2^26 places, or a slice is not loaded.
+    /// If there are more than 2^26 places, or a slice is not loaded.
     pub fn new(map: &SliceMap, start: &Walker, falls: bool) -> Result<Self, WalkError> {
         let mut steps = Steps::new(map, *start.avatar(), falls)?;
         let mut edges = Vec::new();
@@ -65,32 +64,33 @@ impl Reach {
         Self { up: grid.up, lattice: steps.lattice, places }
     }
 
-    /// The lattice of the places.
+    /// Returns the lattice of the places.
     #[must_use]
     pub fn lattice(&self) -> &StepGrid {
         &self.lattice
     }
 
-    /// Number of places.
+    /// Returns the number of places.
     #[must_use]
     pub fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// Returns `true` if the avatar gets nowhere.
+    /// Returns `true` if no place is within reach.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
     }
 
-    /// The columns and rows of the places with the heights of the feet there, in the map's
-    /// coordinates; by rows, then columns, then heights.
+    /// Returns the column and row of each place, with the height of the feet there in the map's
+    /// coordinates; sorted by rows, then columns, then heights.
     #[must_use]
     pub fn cells(&self) -> impl ExactSizeIterator<Item = ([u32; 2], f64)> + '_ {
         self.places.iter().copied()
     }
 
-    /// The places of the feet, in the caller's coordinates, in the order of [`Reach::cells`].
+    /// Returns the places of the feet, in the caller's coordinates, in the order of
+    /// [`Reach::cells`].
     #[must_use]
     pub fn positions(&self) -> impl ExactSizeIterator<Item = [f64; 3]> + '_ {
         self.places.iter().map(|(cell, height)| {
@@ -99,13 +99,14 @@ impl Reach {
         })
     }
 
-    /// Bounds of the places, in the caller's coordinates; `None` if there are none.
+    /// Returns the bounds of the places, in the caller's coordinates; `None` if there are none.
     #[must_use]
     pub fn bounds(&self) -> Option<Aabb> {
         (!self.is_empty()).then(|| Aabb::of(self.positions()))
     }
 
-    /// What of the reach lies on each of these storeys; on one for all if there are none.
+    /// Returns the part of the reach on each of these storeys, or a single part for all if there
+    /// are no storeys.
     #[must_use]
     pub fn by_storey(&self, storeys: &[Storey]) -> Vec<Covered> {
         let mut found = vec![Covered::default(); storeys.len().max(1)];
@@ -126,14 +127,14 @@ impl Reach {
 }
 
 impl Avatar {
-    /// Finds a good place to start: in the largest part of the lowest storey that hangs together,
-    /// the place nearest to its middle. Returns `None` if the avatar can stand nowhere. The
-    /// distance is 0.
+    /// Finds a good place to start: the place nearest to the middle of the largest connected part
+    /// of the lowest storey. Returns `None` if the avatar can stand nowhere. The distance of the
+    /// result is 0.
     ///
     /// Takes as long as [`Reach::new`] for all parts together.
     ///
     /// # Errors
-    /// When there are more than 2^26 places, or a slice is not loaded.
+    /// If there are more than 2^26 places, or a slice is not loaded.
     pub fn roomy_start(&self, map: &SliceMap, storeys: &[Storey]) -> Result<Option<Standing>, WalkError> {
         let mut heights = Vec::new();
         let range = storeys.first().map_or([f64::NEG_INFINITY, f64::INFINITY], |storey| storey.heights);
@@ -163,7 +164,7 @@ impl Avatar {
             let nodes = steps.nodes()[part.clone()].iter().filter(|node| is_lowest(node.height));
             nodes.map(|node| node.cell).collect::<BTreeSet<_>>()
         };
-        // Of parts of the same size the first.
+        // The first of several parts of the same size.
         let largest = parts.iter().rev().max_by_key(|part| cells_of(part).len());
         let Some(largest) = largest else {
             return Ok(None);

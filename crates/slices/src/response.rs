@@ -1,13 +1,14 @@
-//! What an avatar does where something is in its way.
+//! Responses of an avatar to an obstacle.
 
-/// Where an avatar may go instead of a place where there is no room; places across in the map's coordinates.
+/// A choice of places to try instead of a place that is blocked, in the map's horizontal
+/// coordinates.
 pub trait Response: Sync {
-    /// Places to try in turn, coming from `from` and wanting to `wanted`; if none serves, the avatar stays at
-    /// `from`.
+    /// Returns the places to try in turn instead of `wanted`. If all are blocked, the avatar stays
+    /// at `from`.
     fn elsewhere(&self, from: [f64; 2], wanted: [f64; 2]) -> [Option<[f64; 2]>; 2];
 }
 
-/// Back to the last valid place, and no further (S4, §3.1).
+/// Stays at the last valid place (Anjos et al. 2012, §3.1).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Back;
 
@@ -17,7 +18,8 @@ impl Response for Back {
     }
 }
 
-/// Along the wall: that part of the step along one axis of the map, the longer first.
+/// Slides along a wall: tries the part of the step along one axis of the map, then the other, the
+/// longer part first.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Slide;
 

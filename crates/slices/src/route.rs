@@ -1,4 +1,4 @@
-//! Along a route, with whatever slices a step needs at hand.
+//! Walking along a route, with the slices of each step loaded on demand.
 
 use std::ops::RangeInclusive;
 
@@ -10,19 +10,19 @@ use crate::walk::{Step, Walker};
 use crate::walk_error::WalkError;
 use crate::{Grid, Response};
 
-/// Where slices come from: a whole map, or a cache over a folder.
+/// A source of slices: a whole map, or a cache over a folder.
 pub trait Building {
-    /// Why slices cannot be had.
+    /// The error of loading a slice.
     type Error: From<WalkError>;
 
-    /// Where pixels and slices lie.
+    /// Returns the grid of pixels and slices.
     fn grid(&self) -> &Grid;
 
-    /// The map with these slices loaded, for an avatar whose feet are at this height of the map's
-    /// coordinates.
+    /// Returns the map with these slices loaded, for an avatar whose feet are at this height of the
+    /// map's coordinates.
     ///
     /// # Errors
-    /// When one of them cannot be loaded.
+    /// If a slice cannot be loaded.
     fn with_slices(&mut self, slices: RangeInclusive<u32>, feet: f64) -> Result<&SliceMap, Self::Error>;
 }
 
@@ -41,28 +41,29 @@ impl Building for &SliceMap {
     }
 }
 
-/// Where somebody starts, and where to in turn.
+/// A start and the points to walk to in turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Route {
-    /// Where the feet start, in the caller's coordinates.
+    /// The start of the feet, in the caller's coordinates.
     pub start: [f64; 3],
-    /// Places to go to, by the two coordinates across in the caller's order.
+    /// The points to walk to, as two horizontal coordinates in the caller's order.
     pub points: Vec<[f64; 2]>,
 }
 
-/// How a walk ended.
+/// The end of a walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
-    /// At the last point.
+    /// The avatar reached the last point.
     Arrived,
-    /// Before this point, counted from 0, where nothing moved any more.
+    /// The avatar stopped before this point.
     Stuck {
-        /// Which.
+        /// The point, counted from 0.
         point: usize,
     },
-    /// It fell below the map on its way to this point; or from its start, 0, if there are no points.
+    /// The avatar fell below the map on its way to this point, or from its start if there are no
+    /// points (0).
     LeftMap {
-        /// Which.
+        /// The point, counted from 0.
         point: usize,
     },
 }
@@ -71,7 +72,7 @@ impl Route {
     /// Checks that all places are finite.
     ///
     /// # Errors
-    /// Names the first that is not.
+    /// If a place is not finite; the error names the first one.
     pub fn check(&self) -> Result<(), WalkError> {
         if !self.start.iter().all(|x| x.is_finite()) {
             return Err(WalkError::NotFinite { index: 0 });
@@ -82,7 +83,7 @@ impl Route {
         }
     }
 
-    /// Checks that walking and falling comes to an end while somebody waits for it.
+    /// Checks that a walk and a fall end in reasonable time.
     fn check_steps(&self, grid: &Grid, avatar: &Avatar) -> Result<(), WalkError> {
         let places = || std::iter::once(self.start_across(grid)).chain(self.points.iter().copied());
         let ways =
@@ -92,7 +93,7 @@ impl Route {
         if steps > MOST_STEPS {
             #[expect(clippy::cast_precision_loss, reason = "a bound")]
             let on_map = self.points.len() as f64 * (width(grid, 0) + width(grid, 1));
-            // Where as many points on the map would do, it is not the step's fault.
+            // If as many points on the map would do, the distance is at fault, not the step.
             let far = places().map(|place| off(grid, place)).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
             return Err(match far.filter(|_| on_map / length <= MOST_STEPS) {
                 Some((index, away)) => WalkError::FarOff { index, away },
@@ -104,18 +105,18 @@ impl Route {
         if steps > MOST_STEPS { Err(WalkError::TooShort { what, length, steps }) } else { Ok(()) }
     }
 
-    /// The start, by the two coordinates across in the caller's order.
+    /// Returns the start as two horizontal coordinates in the caller's order.
     fn start_across(&self, grid: &Grid) -> [f64; 2] {
         let [u, v, _] = grid.up.to_map(self.start);
-        // Which is its own inverse.
+        // `across` is its own inverse.
         grid.up.across([u, v])
     }
 
-    /// Walks along the route, straight from point to point, until it ends; hands out the building and every
-    /// step.
+    /// Walks straight from point to point of the route until the walk ends. Passes the building and
+    /// every step to `each`.
     ///
     /// # Errors
-    /// As [`Route::stand`] and [`Route::follow`].
+    /// As for [`Route::stand`] and [`Route::follow`].
     pub fn walk<B: Building>(
         &self,
         building: &mut B,
@@ -127,12 +128,12 @@ impl Route {
         self.follow(building, walker, response, each)
     }
 
-    /// Puts an avatar at the start, as [`Walker::new`] does; a fall from above the map begins where there may
-    /// be something.
+    /// Puts an avatar at the start, as [`Walker::new`] does. A fall from above the map begins at
+    /// its top.
     ///
     /// # Errors
-    /// When a place is not finite or far off the map, there is no room at the start, steps or climb are so
-    /// short that there would be more than 2^32 of them, or a slice cannot be loaded.
+    /// If a place is not finite or far off the map, the start is blocked, steps or climb are so
+    /// short that there would be more than 2^32 steps, or a slice cannot be loaded.
     pub fn stand<B: Building>(&self, building: &mut B, avatar: &Avatar) -> Result<Walker, B::Error> {
         self.check()?;
         let grid = building.grid();
@@ -146,13 +147,14 @@ impl Route {
         Ok(Walker::new(*avatar, map, start)?)
     }
 
-    /// Walks on from the start ([`Route::stand`]), straight from point to point, until it ends; without
-    /// points, down to what is below. Hands out the building and every step.
+    /// Walks on from the start ([`Route::stand`]), straight from point to point, until the walk
+    /// ends. Without points, it falls to the floor below. Passes the building and every step to
+    /// `each`.
     ///
-    /// Every step but a fall comes nearer to the next point, so it ends.
+    /// Every step except a fall comes nearer to the next point, so the walk ends.
     ///
     /// # Errors
-    /// When a slice cannot be loaded; or what `each` ends it with.
+    /// If a slice cannot be loaded, or `each` fails.
     pub fn follow<B: Building, E: From<B::Error>>(
         &self,
         building: &mut B,
@@ -172,7 +174,7 @@ impl Route {
                 let before = walker;
                 let step = walker.step(map, *target, response).map_err(unloaded::<B::Error>)?;
                 each(building, &step)?;
-                // First, since what is far below falls by less than its height can tell.
+                // Checked first: far below the map, a fall is too small to change the height.
                 if walker.feet() < building.grid().origin[2] - walker.climb() {
                     return Ok(Ended::LeftMap { point });
                 }
@@ -186,12 +188,13 @@ impl Route {
     }
 }
 
-/// Of the map, along an axis across.
+/// Returns the width of the map along a horizontal axis.
 fn width(grid: &Grid, axis: usize) -> f64 {
     f64::from(grid.counts[axis]) * grid.pixel
 }
 
-/// How far a place, by the two coordinates across in the caller's order, is off the map, along an axis.
+/// Returns how far a place is off the map along an axis. The place is given as two horizontal
+/// coordinates in the caller's order.
 fn off(grid: &Grid, place: [f64; 2]) -> f64 {
     let place = grid.up.across(place);
     let low = |k: usize| grid.origin[k];
@@ -199,7 +202,7 @@ fn off(grid: &Grid, place: [f64; 2]) -> f64 {
     beyond(0).max(beyond(1)).max(0.0)
 }
 
-/// Of a walk; some hours' worth.
+/// Greatest number of steps of a walk, some hours of work.
 const MOST_STEPS: f64 = 4_294_967_296.0;
 
 /// No slices.

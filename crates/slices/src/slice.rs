@@ -173,8 +173,7 @@ impl Slice {
         self.height
     }
 
-    /// The xxh3-64 checksum of the content. Slices with the same checksum are taken to be the same
-    /// image.
+    /// The xxh3-64 checksum of the content, the same for equal images.
     #[must_use]
     pub fn checksum(&self) -> u64 {
         self.checksum

@@ -1,5 +1,5 @@
-//! The graph of a walker's own steps: places of a lattice, joined where an avatar walks from one to
-//! the next.
+//! The graph of a walker's steps: places of a lattice, joined where an avatar walks from one to the
+//! next.
 //!
 //! A node is a state of a [`Walker`]: its place and its footing, on which the next step depends. An
 //! edge is simulated by the walker itself, so each one can be walked.
@@ -10,10 +10,10 @@ use crate::walk::Walker;
 use crate::walk_error::WalkError;
 use crate::{Avatar, Back};
 
-/// The greatest number of states that a search holds: some 4 GB.
+/// The greatest number of states of a search, which take some 4 GB.
 const MOST_NODES: usize = 1 << 26;
 
-/// The greatest number of pixels under bases at all places of a lattice: minutes.
+/// The greatest number of pixels under bases at all places of a lattice, a search of minutes.
 const MOST_WORK: u64 = 1 << 36;
 
 /// Cells along a side of a tile, and the greatest number of tiles.
@@ -43,9 +43,9 @@ pub(crate) struct Node {
 pub(crate) struct Edge {
     /// The node that it leads to.
     pub(crate) node: u32,
-    /// Its length across.
+    /// Its horizontal length.
     pub(crate) length: f64,
-    /// Whether the node was not known before.
+    /// `true` if the node was not known before.
     pub(crate) is_new: bool,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct Edge {
 pub(crate) struct Steps<'a> {
     map: &'a SliceMap,
     avatar: Avatar,
-    /// Where nodes may be.
+    /// The places of nodes.
     pub(crate) lattice: StepGrid,
     falls: bool,
     nodes: Vec<Node>,
@@ -64,8 +64,8 @@ pub(crate) struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    /// Returns the graph of an avatar in a map, of which nothing is explored yet. With `falls` an
-    /// edge may lead over a fall.
+    /// Returns the graph of an avatar in a map, with nothing explored yet. With `falls` an edge may
+    /// include a fall.
     pub(crate) fn new(map: &'a SliceMap, avatar: Avatar, falls: bool) -> Result<Self, WalkError> {
         let step = avatar.stride().1;
         let lattice = StepGrid::new(map.grid(), &avatar, step);
@@ -84,7 +84,7 @@ impl<'a> Steps<'a> {
         Ok(Self { map, avatar, lattice, falls, nodes: Vec::new(), tiles: vec![None; tiles], tile_columns })
     }
 
-    /// All nodes that are known, in the order in which they were found.
+    /// Returns all known nodes, in the order in which they were found.
     pub(crate) fn nodes(&self) -> &[Node] {
         &self.nodes
     }
@@ -136,13 +136,13 @@ impl<'a> Steps<'a> {
         Ok((index, true))
     }
 
-    /// Returns where a walker comes to that walks straight to a place, across in the map's
-    /// coordinates.
+    /// Returns the state of a walker after it walks straight to a place, in the map's horizontal
+    /// coordinates; `None` if it does not arrive.
     pub(crate) fn straight(&self, walker: &Walker, to: [f64; 2]) -> Result<Option<Walker>, Unloaded> {
         straight(self.map, walker, to, self.falls, |_| ())
     }
 
-    /// Collects the edges from a walker anywhere to the corners of its cell of the lattice.
+    /// Collects the edges from a walker at any place to the corners of its cell of the lattice.
     pub(crate) fn enter(&mut self, walker: &Walker, edges: &mut Vec<Edge>) -> Result<(), WalkError> {
         let [x, y, _] = walker.place();
         edges.clear();
@@ -184,9 +184,10 @@ impl<'a> Steps<'a> {
     }
 }
 
-/// Walks straight to a place, across in the map's coordinates, as
-/// [`Route::follow`](crate::Route::follow) does, and hands out every state on the way. Returns
-/// `None` if anything is in the way, if the walker falls without `falls`, or if it leaves the map.
+/// Walks straight to a place, in the map's horizontal coordinates, as
+/// [`Route::follow`](crate::Route::follow) does, and passes every state on the way to `each`.
+/// Returns `None` if anything is in the way, if the walker falls without `falls`, or if it leaves
+/// the map.
 pub(crate) fn straight(
     map: &SliceMap,
     walker: &Walker,

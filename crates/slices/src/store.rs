@@ -1,6 +1,6 @@
-//! A map on disk: a folder with an index and a compressed file a slice, identical slices once.
+//! A map on disk: a folder with an index and one compressed file for each distinct slice.
 //!
-//! A slice's file is named after the checksum of what it holds.
+//! The file of a slice is named after the checksum of its content.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -28,86 +28,86 @@ pub(crate) const PIXELS: [u8; 4] = *b"PIXL";
 /// Name of the index.
 pub(crate) const INDEX_NAME: &str = "index.nms";
 
-/// Why a map is not saved or loaded.
+/// Errors of saving and loading a map.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoreError {
-    /// The index cannot be read, or is not what it should be.
+    /// The index cannot be read, or is not an index.
     #[error("{}", of_map(.0, &["prepare"]))]
     Open(#[from] OpenError),
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// No folder can be made there, or it cannot be looked into.
+    /// The folder cannot be made or read.
     #[error("{}: cannot {verb} the folder ({cause}); check the path and its permissions", path.display())]
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What was being done.
+        /// The failed operation.
         verb: &'static str,
-        /// What the operating system said.
+        /// The error of the operating system.
         cause: io::Error,
     },
-    /// A folder that somebody else writes into.
+    /// Another process is writing into the folder.
     #[error("{}: another build is writing into this folder; wait until it is done, or name another folder", path.display())]
     Busy {
         /// The folder.
         path: PathBuf,
     },
-    /// A folder of something else.
-    #[error("{}: the folder holds other files and no slice map; name a new folder", path.display())]
+    /// The folder holds other files.
+    #[error("{}: expected a new or empty folder, or one with a slice map, got other files; name another folder", path.display())]
     Foreign {
         /// The folder.
         path: PathBuf,
     },
-    /// An index that no map has.
-    #[error("{}: is damaged: {what}; build the slices again", path.display())]
+    /// The index is invalid.
+    #[error("{}: {what}; build the slices again", path.display())]
     Index {
-        /// Its file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         what: &'static str,
     },
     /// The file of a slice holds another image than the index names.
-    #[error("slice {slice}: {}: does not hold this slice; build the slices again", path.display())]
+    #[error("slice {slice}: {}: expected this slice, got another image; build the slices again", path.display())]
     Image {
-        /// Which slice.
+        /// The slice, counted from the lowest.
         slice: u32,
-        /// Its file.
+        /// The file.
         path: PathBuf,
     },
     /// The file of a slice cannot be used.
     #[error("slice {slice}: {}", of_map(cause, &["prepare", "check the path"]))]
     Slice {
-        /// Which slice.
+        /// The slice, counted from the lowest.
         slice: u32,
-        /// Why.
+        /// The cause.
         cause: OpenError,
     },
-    /// Slices that differ and would have one file.
+    /// Different slices have the same checksum, so they would share a file.
     #[error(
-        "different slices have the checksum {checksum:016x}, so the map is not saved; choose another size of pixels"
+        "expected different checksums of different slices, got {checksum:016x} twice; choose another pixel size"
     )]
     Alike {
-        /// Of both.
+        /// The checksum of both.
         checksum: u64,
     },
-    /// A map of which slices are missing is not saved.
-    #[error("slice {slice} is not loaded, so the map is not saved")]
+    /// The map to save lacks a slice.
+    #[error("expected a map with all slices loaded, got one without slice {slice}")]
     Incomplete {
-        /// Which.
+        /// The missing slice.
         slice: u32,
     },
-    /// Nobody can walk.
+    /// A walk fails.
     #[error(transparent)]
     Walk(#[from] WalkError),
 }
 
-/// What is wrong with a file of a map. Containers only know of scans, which are prepared again: `unfit` are
-/// remedies that do not serve.
+/// Describes an error in a file of a map. The container errors suggest remedies for scans; remedies
+/// with a word of `unfit` are replaced.
 fn of_map(cause: &OpenError, unfit: &[&str]) -> String {
     let what = match &cause.fault {
-        ContainerFault::NotAContainer { .. } => "is no file of a slice map".to_owned(),
+        ContainerFault::NotAContainer { .. } => "expected a file of a slice map, got another format".to_owned(),
         fault => match fault.to_string().rsplit_once("; ") {
             Some((what, remedy)) if unfit.iter().any(|word| remedy.contains(word)) => what.to_owned(),
             _ => return cause.to_string(),
@@ -117,7 +117,7 @@ fn of_map(cause: &OpenError, unfit: &[&str]) -> String {
     format!("{path}: {what}; build the slices again")
 }
 
-/// The file of the slice with this checksum.
+/// Returns the file name of the slice with this checksum.
 pub(crate) fn image_name(checksum: u64) -> String {
     format!("{checksum:016x}.nms")
 }
@@ -126,7 +126,7 @@ pub(crate) fn image_name(checksum: u64) -> String {
 pub(crate) fn load(folder: &Path, slice: u32, checksum: u64, grid: &Grid) -> Result<Slice, StoreError> {
     let path = folder.join(image_name(checksum));
     let failed = |cause| StoreError::Slice { slice, cause };
-    // The checksum of the image tells all that those of the file would.
+    // The checksum of the image makes the checksums of the file redundant.
     let file = File::read(&path, Check::Structure).map_err(failed)?;
     file.expect(IMAGE.0, IMAGE.1..=IMAGE.1).map_err(failed)?;
     let bytes = file.array::<u8>(PIXELS, 0).map_err(failed)?;
@@ -135,7 +135,7 @@ pub(crate) fn load(folder: &Path, slice: u32, checksum: u64, grid: &Grid) -> Res
     image.filter(|image| image.checksum() == checksum).ok_or(StoreError::Image { slice, path })
 }
 
-/// A map in a folder, of which the index is read and every slice is loaded when it is wanted.
+/// A map in a folder: the index is in memory, slices are loaded on request.
 #[derive(Debug, Clone)]
 pub struct SliceFolder {
     folder: PathBuf,
@@ -147,7 +147,7 @@ impl SliceFolder {
     /// Reads the index.
     ///
     /// # Errors
-    /// When there is none, or it is damaged.
+    /// If the index is missing or damaged.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self, StoreError> {
         let folder = folder.as_ref();
         let path = folder.join(INDEX_NAME);
@@ -162,44 +162,44 @@ impl SliceFolder {
             && grid.counts.iter().all(|n| *n > 0)
             && u64::from(grid.counts[0]) * u64::from(grid.counts[1]) <= 1 << 31;
         if !is_sound {
-            return Err(StoreError::Index { path, what: "its lattice is none" });
+            return Err(StoreError::Index { path, what: "expected a valid lattice, got sizes or counts out of range" });
         }
         if checksums.len() != grid.counts[2] as usize {
-            return Err(StoreError::Index { path, what: "it names another number of slices than it has" });
+            return Err(StoreError::Index { path, what: "expected a checksum for each slice, got another number of checksums" });
         }
         Ok(Self { folder: folder.to_owned(), index, checksums: checksums.as_ref().into() })
     }
 
-    /// Where pixels and slices lie.
+    /// Returns the grid of pixels and slices.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.index.grid
     }
 
-    /// What the map was made of.
+    /// Returns the origin of the map: its rule, noise and number of points.
     #[must_use]
     pub fn about(&self) -> &About {
         &self.index.about
     }
 
-    /// Checksums of the slices, lowest first; equal ones have one file.
+    /// Returns the checksums of the slices, lowest first. Equal slices share a file.
     #[must_use]
     pub fn checksums(&self) -> &[u64] {
         &self.checksums
     }
 
-    /// How many slices differ.
+    /// Returns the number of distinct slices.
     #[must_use]
     pub fn distinct(&self) -> usize {
         self.firsts().len()
     }
 
-    /// Checksums and the lowest slice that has each.
+    /// Returns the distinct checksums, each with its lowest slice.
     fn firsts(&self) -> BTreeMap<u64, u32> {
         (0..self.grid().counts[2]).rev().map(|s| (self.checksums[s as usize], s)).collect()
     }
 
-    /// Bytes of all files that are there.
+    /// Returns the bytes of all existing files of the map.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let length = |path: &Path| fs::metadata(path).map_or(0, |about| about.len());
@@ -211,16 +211,17 @@ impl SliceFolder {
     /// Loads a slice, and checks that it is the one that was saved.
     ///
     /// # Errors
-    /// Names the file that is missing or damaged.
+    /// If the file is missing or damaged; the error names it.
     ///
     /// # Panics
-    /// When there is no such slice.
+    /// If there is no such slice.
     pub fn load(&self, slice: u32) -> Result<Slice, StoreError> {
         load(&self.folder, slice, self.checksums[slice as usize], self.grid())
     }
 
-    /// The whole map in memory, and what could not be loaded of it, lowest first, a file once: those slices
-    /// are missing, the others serve.
+    /// Loads the whole map. Returns it with the errors of the slices that could not be loaded,
+    /// lowest first, one for each file. Those slices are missing from the map; the others are
+    /// usable.
     #[must_use]
     pub fn load_all(&self) -> (SliceMap, Vec<StoreError>) {
         let mut firsts: Vec<(u64, u32)> = self.firsts().into_iter().collect();
@@ -241,7 +242,7 @@ impl SliceFolder {
         (map, faults)
     }
 
-    /// The map without any slice.
+    /// Returns the map without any slice.
     pub(crate) fn unloaded(&self) -> SliceMap {
         SliceMap::unloaded(self.index)
     }

@@ -1,8 +1,9 @@
-//! Writing a map into a folder, over another or a new one.
+//! Writing a map into a folder, new or with another map.
 //!
-//! A map that is written over another never changes a file that the other's index names: slices come first,
-//! then the index replaces the old one in one step, then files that it does not name go. So two that write at
-//! once would remove each other's slices: whoever writes holds a lock on a file in the folder.
+//! A new map never changes a file that the old index names. Slices are written first, then the
+//! index replaces the old one in one step, then files that the new index does not name are removed.
+//! Two writers at once would remove each other's slices, so a writer holds a lock on a file in the
+//! folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, TryLockError};
@@ -19,19 +20,20 @@ use crate::slice::Slice;
 use crate::store::{CHECKSUMS, IMAGE, INDEX, INDEX_NAME, PIXELS, SliceFolder, StoreError, image_name, load};
 use crate::{Grid, SliceMap};
 
-/// Name of the file that is locked, there only as long.
+/// Name of the lock file, which exists only while the lock is held.
 const LOCK_NAME: &str = "index.lock";
 
-/// Attempts at the lock; each fails only if another process was done within microseconds.
+/// Attempts to take the lock; one fails only if another process finished within microseconds.
 const ATTEMPTS: usize = 16;
 
-/// Between the name of a file and the twelve letters and digits of its temporary ([`Writer::save`]).
+/// The infix between the name of a file and the random suffix of its temporary file, and the length
+/// of the suffix ([`Writer::save`]).
 const TEMPORARY: (&str, usize) = (".tmp-", 12);
 
-/// A folder that a map will be written into, held so that nobody else writes there.
+/// A locked folder that a map will be written into.
 ///
-/// Folders that were made for it go again if nothing is written. Where the file system knows no locks, nobody
-/// is kept out.
+/// Folders that were made for it are removed if nothing is written. On a file system without locks,
+/// other writers are not kept out.
 #[derive(Debug)]
 pub struct SliceTarget {
     folder: PathBuf,
@@ -41,12 +43,12 @@ pub struct SliceTarget {
 }
 
 impl SliceTarget {
-    /// Makes the folder, or checks that it is empty or holds a map, or what is left of one; and takes the
+    /// Makes the folder, or checks that it is empty or holds a map or the remains of one. Takes the
     /// lock.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to, holds other files and no map, or somebody else is
-    /// writing there.
+    /// If the folder cannot be made or written to, holds other files and no map, or another process
+    /// is writing there.
     pub fn new(folder: impl AsRef<Path>) -> Result<Self, StoreError> {
         let folder = folder.as_ref();
         let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
@@ -56,11 +58,11 @@ impl SliceTarget {
         Ok(Self { folder: folder.to_owned(), _lock: lock(folder)?, _made: made })
     }
 
-    /// Writes the map, which replaces the one that is there. Returns the bytes of all files.
+    /// Writes the map, which replaces the old one. Returns the bytes of all files.
     ///
     /// # Errors
-    /// When something cannot be written, or slices are missing; then nothing new is left, and a map that was
-    /// there before is whole.
+    /// If a file cannot be written, or slices are missing. Then the new files are removed, and an
+    /// old map stays whole.
     pub fn save(self, map: &SliceMap) -> Result<u64, StoreError> {
         let images = (0..).zip(map.slices()).map(|(slice, image)| match image {
             Some(image) => Ok(&**image),
@@ -70,11 +72,11 @@ impl SliceTarget {
         self.write(map.index(), |saved| saved.add(&images))
     }
 
-    /// Makes a map of what the builder has seen and writes each slice as it is made, so that the map need not
-    /// fit into memory; otherwise as [`save`](Self::save), with the same files.
+    /// Makes the map of a builder and writes each slice as it is made, so that the map need not fit
+    /// into memory. The files are the same as those of [`save`](Self::save).
     ///
     /// # Errors
-    /// As [`save`](Self::save).
+    /// As for [`save`](Self::save).
     pub fn build(self, builder: SliceBuilder) -> Result<u64, StoreError> {
         let (index, together) = (builder.index(), builder.together());
         self.write(&index, |saved| {
@@ -105,7 +107,7 @@ impl SliceTarget {
         });
         match written {
             Ok(_) => self.clear(before, &saved.known),
-            // A file that cannot be removed does no harm, here and below.
+            // Files that cannot be removed do no harm, here and below.
             Err(_) => saved.new.iter().for_each(|path| _ = fs::remove_file(path)),
         }
         written
@@ -122,7 +124,7 @@ impl SliceTarget {
         self.folder.join(image_name(checksum))
     }
 
-    /// Removes slices of the map that was there before, and what killed writers left.
+    /// Removes the slices of the old map, and the files that killed writers left.
     fn clear(&self, before: &[u64], now: &BTreeSet<u64>) {
         let Ok(entries) = fs::read_dir(&self.folder) else { return };
         for entry in entries.flatten() {
@@ -138,15 +140,15 @@ impl SliceTarget {
     }
 }
 
-/// Slices of a map that are written already.
+/// The slices of a map that are written already.
 struct Saved<'a> {
     target: &'a SliceTarget,
     grid: &'a Grid,
     /// Checksums of all slices so far, lowest first.
     sums: Vec<u64>,
-    /// The same, each once.
+    /// The distinct checksums.
     known: BTreeSet<u64>,
-    /// Files that were not there before.
+    /// Files that did not exist before.
     new: Vec<PathBuf>,
     bytes: u64,
 }
@@ -176,7 +178,7 @@ impl Saved<'_> {
     }
 }
 
-/// While the lock is held.
+/// The file is removed while the lock is still held.
 impl Drop for SliceTarget {
     fn drop(&mut self) {
         let _ = fs::remove_file(self.folder.join(LOCK_NAME));
@@ -184,18 +186,18 @@ impl Drop for SliceTarget {
 }
 
 impl SliceMap {
-    /// Writes the map into a folder, which is made, is empty, or holds another map, which it replaces. Tells
-    /// the bytes of all files.
+    /// Writes the map into a folder, which may be missing, empty, or hold another map to replace.
+    /// Returns the bytes of all files.
     ///
     /// # Errors
-    /// As [`SliceTarget::new`] and [`SliceTarget::save`].
+    /// As for [`SliceTarget::new`] and [`SliceTarget::save`].
     pub fn save(&self, folder: impl AsRef<Path>) -> Result<u64, StoreError> {
         let folder = folder.as_ref();
         SliceTarget::new(folder)?.save(self)
     }
 }
 
-/// Slices by their checksums.
+/// Returns the distinct slices by their checksums.
 fn distinct<'a>(
     images: impl Iterator<Item = (u64, &'a Slice)>,
 ) -> Result<BTreeMap<u64, &'a Slice>, StoreError> {
@@ -209,7 +211,7 @@ fn distinct<'a>(
     Ok(distinct)
 }
 
-/// Folders that were made, deepest first; they go if nothing is in them in the end.
+/// Folders that were made, deepest first; removed on drop if they are empty.
 #[derive(Debug)]
 struct Made(Vec<PathBuf>);
 
@@ -223,8 +225,8 @@ fn failed(folder: &Path, verb: &'static str) -> impl Fn(io::Error) -> StoreError
     move |cause| StoreError::Folder { path: folder.to_owned(), verb, cause }
 }
 
-/// Whether a map may be written into a folder. A damaged index is one all the same; without an index there
-/// may be what killed writers left.
+/// Checks that a map may be written into a folder. A damaged index still counts as a map. Without
+/// an index, the folder may hold files that killed writers left.
 fn check(folder: &Path) -> Result<(), StoreError> {
     let foreign = || StoreError::Foreign { path: folder.to_owned() };
     let index = File::read(folder.join(INDEX_NAME), Check::Structure);
@@ -250,7 +252,7 @@ fn check(folder: &Path) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// The lock of a folder; whoever had it before may have removed the file meanwhile.
+/// Takes the lock of a folder. The previous owner may have removed the file meanwhile.
 fn lock(folder: &Path) -> Result<fs::File, StoreError> {
     let path = folder.join(LOCK_NAME);
     for _ in 0..ATTEMPTS {
@@ -266,7 +268,7 @@ fn lock(folder: &Path) -> Result<fs::File, StoreError> {
     Err(StoreError::Busy { path: folder.to_owned() })
 }
 
-/// Whether an open file is the one at this path.
+/// Returns `true` if an open file is the one at this path.
 #[cfg(unix)]
 fn is_at(file: &fs::File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -274,19 +276,19 @@ fn is_at(file: &fs::File, path: &Path) -> bool {
     matches!((&file.metadata(), &fs::metadata(path)), (Ok(a), Ok(b)) if id(a) == id(b))
 }
 
-/// Whether an open file is the one at this path.
+/// Returns `true` if an open file is the one at this path.
 #[cfg(not(unix))]
 fn is_at(_file: &fs::File, path: &Path) -> bool {
     path.exists()
 }
 
-/// Of which slice a file of this name is.
+/// Returns the checksum of the slice in a file of this name.
 fn checksum_of(name: &str) -> Option<u64> {
     let checksum = u64::from_str_radix(name.split('.').next()?, 16).ok()?;
     (image_name(checksum) == name).then_some(checksum)
 }
 
-/// Whether a file holds a slice, or is gone by now.
+/// Returns `true` if a file holds a slice, or no longer exists.
 fn is_image(path: &Path) -> bool {
     match File::read(path, Check::Structure) {
         Ok(file) => file.kind() == IMAGE.0,
@@ -296,7 +298,7 @@ fn is_image(path: &Path) -> bool {
     }
 }
 
-/// Whether a file of this name is what becomes one of ours.
+/// Returns `true` if this is the name of a temporary file of a map.
 fn is_temporary(name: &str) -> bool {
     let (infix, length) = TEMPORARY;
     name.rsplit_once(infix).is_some_and(|(target, random)| {
@@ -305,7 +307,7 @@ fn is_temporary(name: &str) -> bool {
     })
 }
 
-/// Whether nobody is writing a temporary any more.
+/// Returns `true` if no process is writing a temporary file any more.
 fn is_abandoned(path: &Path) -> bool {
     fs::OpenOptions::new().write(true).open(path).is_ok_and(|file| file.try_lock().is_ok())
 }

@@ -29,7 +29,7 @@ pub enum Up {
 
 /// The text names no axis.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("`{given}` is no axis; known are x, y, z, -x, -y and -z")]
+#[error("expected x, y, z, -x, -y or -z, got `{given}`")]
 pub struct UnknownAxis {
     /// The text.
     pub given: String,

@@ -1,9 +1,10 @@
-//! An avatar in a building: steps of fixed length, up and down what it can climb, and falling.
+//! An avatar in a building: steps of fixed length, climbing and falling.
 //!
-//! S4, §3.1: pixels that hold something stop the avatar, except those it can climb; where it collides it goes
-//! back to where it was, so it always stands on a valid place; its height is that of the floor under its
-//! base. Here, what is no higher than it can climb carries it, floor or not, but climbing counts from the
-//! last floor: so a slope that is too steep is no way up, however short the steps.
+//! In Anjos et al. 2012, §3.1, occupied pixels stop the avatar unless it can climb them; after a
+//! collision it goes back, so it is always at a valid place; its height is that of the floor under
+//! its base. Here everything that is low enough to climb supports the avatar, floor or not, but a
+//! climb counts from the last floor. So a slope that is too steep cannot be climbed, however short
+//! the steps.
 
 use std::ops::RangeInclusive;
 
@@ -22,16 +23,16 @@ const SLICE: i64 = LEVELS as i64;
 /// Avatars that a thread takes at a time.
 const CHUNK: usize = 64;
 
-/// What became of a step.
+/// The result of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// Where the feet are, in the caller's coordinates.
+    /// The place of the feet, in the caller's coordinates.
     pub position: [f64; 3],
-    /// Whether something was in the way.
+    /// `true` if something was in the way.
     pub blocked: bool,
-    /// Whether it fell, or is about to.
+    /// `true` if it fell, or is about to fall.
     pub falling: bool,
-    /// The lowest and the highest slice that the avatar spans, as far as they are on the map.
+    /// The lowest and the highest slice that the avatar spans, clamped to the map.
     pub slices: [u32; 2],
 }
 
@@ -39,32 +40,32 @@ pub struct Step {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Walker {
     avatar: Avatar,
-    /// Of the feet, in the map's coordinates.
+    /// The place of the feet, in the map's coordinates.
     place: [f64; 3],
-    /// Height of the last floor under them, from which climbing counts; never above them.
+    /// Height of the last floor under the feet, from which a climb counts; never above the feet.
     footing: f64,
     falling: bool,
 }
 
-/// Steps that gain less, in steps, are none.
+/// Least progress of a step, as a share of its length; less counts as no progress.
 const LEAST_GAIN: f64 = 1e-3;
 
-/// What is at a place.
+/// The surroundings of a place.
 struct Look {
-    /// Something the avatar can neither climb nor pass under.
+    /// `true` if the avatar can neither climb nor pass under something there.
     blocked: bool,
-    /// Height of what would carry it.
+    /// Height of the surface that would support the avatar.
     support: Option<f64>,
-    /// Height of the highest floor there.
+    /// Height of the highest floor.
     floor: Option<f64>,
 }
 
 impl Walker {
-    /// Puts an avatar's feet at a place of the caller's coordinates: on what is there, at most as far below
-    /// or above as it climbs; else it begins to fall.
+    /// Puts an avatar's feet at a place of the caller's coordinates: on a surface at most a climb
+    /// below or above, otherwise it begins to fall.
     ///
     /// # Errors
-    /// When the place is not finite, or there is no room; or a slice is not loaded.
+    /// If the place is not finite or blocked, or a slice is not loaded.
     pub fn new(avatar: Avatar, map: &SliceMap, start: [f64; 3]) -> Result<Self, WalkError> {
         if !start.iter().all(|x| x.is_finite()) {
             return Err(WalkError::NotFinite { index: 0 });
@@ -78,25 +79,25 @@ impl Walker {
         }
     }
 
-    /// The slices that finding the place `start` needs, as far as they are on the map.
+    /// Returns the slices of the map that [`Walker::new`] needs at `start`.
     #[must_use]
     pub fn needs_at(avatar: &Avatar, grid: &Grid, start: [f64; 3]) -> Option<RangeInclusive<u32>> {
         let place = grid.up.to_map(start);
         Self { avatar: *avatar, place, footing: place[2], falling: false }.needs(grid)
     }
 
-    /// Where the feet are, in the caller's coordinates.
+    /// The place of the feet, in the caller's coordinates.
     #[must_use]
     pub fn position(&self, grid: &Grid) -> [f64; 3] {
         grid.up.from_map(self.place)
     }
 
-    /// A walker that stands where another of the same avatar stood, on the same footing.
+    /// Creates a walker in a state of another walker of the same avatar.
     pub(crate) fn resumed(avatar: Avatar, place: [f64; 3], footing: f64) -> Self {
         Self { avatar, place, footing, falling: false }
     }
 
-    /// The avatar.
+    /// Returns the avatar.
     #[must_use]
     pub fn avatar(&self) -> &Avatar {
         &self.avatar
@@ -107,56 +108,58 @@ impl Walker {
         self.place
     }
 
-    /// Height of the last floor under the feet, in the map's coordinates.
+    /// Returns the height of the last floor under the feet, in the map's coordinates.
     pub(crate) fn footing(&self) -> f64 {
         self.footing
     }
 
-    /// Height of the feet in the map's coordinates.
+    /// Returns the height of the feet, in the map's coordinates.
     pub(crate) fn feet(&self) -> f64 {
         self.place[2]
     }
 
-    /// How far it falls in a step.
+    /// Returns the distance that it falls in a step.
     pub(crate) fn climb(&self) -> f64 {
         self.avatar.options().climb
     }
 
-    /// Whether it stands on nothing.
+    /// Returns `true` if nothing supports it.
     #[must_use]
     pub fn is_falling(&self) -> bool {
         self.falling
     }
 
-    /// Whether it got on so little since it was `before`, though it does not fall and is not there, that it
-    /// is as good as stuck: along a wall, ever shorter steps of which only the part along it counts.
+    /// Returns `true` if the step from `before` made so little progress that the walker is as good
+    /// as stuck, and neither state is falling. Along a wall, only the part of a step along the wall
+    /// counts, and steps become ever shorter.
     pub(crate) fn creeps(&self, before: &Self) -> bool {
         let way = [0, 1, 2].map(|k| self.place[k] - before.place[k]);
         let gained = way.iter().map(|x| x * x).sum::<f64>().sqrt();
         !self.falling && !before.falling && gained < LEAST_GAIN * self.avatar.stride().1
     }
 
-    /// Whether it is at this place, given as the two coordinates across in the caller's order.
+    /// Returns `true` if it is at this place, given as two horizontal coordinates in the caller's
+    /// order.
     #[must_use]
     pub fn is_at(&self, grid: &Grid, target: [f64; 2]) -> bool {
         [self.place[0], self.place[1]] == grid.up.across(target)
     }
 
-    /// The slices that the next step needs, as far as they are on the map.
+    /// Returns the slices of the map that the next step needs.
     #[must_use]
     pub fn needs(&self, grid: &Grid) -> Option<RangeInclusive<u32>> {
         let AvatarOptions { height, climb, .. } = *self.avatar.options();
         grid.range(2, [self.place[2] - climb, self.footing + climb + height])
     }
 
-    /// One step towards a place, given as the two coordinates across in the caller's order; or, while it
-    /// falls, one step down.
+    /// Takes one step towards a place, given as two horizontal coordinates in the caller's order. A
+    /// falling walker takes one step down instead.
     ///
-    /// If something is in the way, `response` says where else it may go; if that does not serve either, it
-    /// stays. So it does if the place is not finite.
+    /// If something is in the way, `response` chooses the places to try instead. If they are
+    /// blocked too, or the place is not finite, the walker stays.
     ///
     /// # Errors
-    /// When a slice that is needed is not loaded; then it is where it was.
+    /// If a required slice is not loaded; then the walker stays where it was.
     pub fn step(
         &mut self,
         map: &SliceMap,
@@ -189,14 +192,14 @@ impl Walker {
         if !length.is_finite() {
             return [self.place[0], self.place[1]];
         }
-        // Rounding never leaves a last step without length.
+        // The tolerance keeps rounding from leaving a last step without length.
         if length <= step * (1.0 + 1e-9) {
             return target;
         }
         [0, 1].map(|k| self.place[k] + way[k] / length * step)
     }
 
-    /// Goes to a place if there is room.
+    /// Moves to a place unless it is blocked. Returns `true` if it moved.
     fn stand(&mut self, map: &SliceMap, place: [f64; 2]) -> Result<bool, Unloaded> {
         let climb = self.avatar.options().climb;
         let look = self.look(map, place, [self.place[2] - climb, self.footing + climb])?;
@@ -205,7 +208,7 @@ impl Walker {
         }
         let height = look.support.unwrap_or(self.place[2]);
         let footing = look.floor.unwrap_or(self.footing).min(height);
-        // What is too high for the floor below it could never be left.
+        // A surface too high above the floor below it could never be left again.
         if look.support.is_some() && height > footing + climb {
             return Ok(false);
         }
@@ -215,7 +218,7 @@ impl Walker {
         Ok(true)
     }
 
-    /// Down as far as it climbs, or onto what is there.
+    /// Falls by a climb, or onto the first surface within it.
     fn fall(&mut self, map: &SliceMap) -> Result<(), Unloaded> {
         let [x, y, z] = self.place;
         let below = z - self.avatar.options().climb;
@@ -226,7 +229,7 @@ impl Walker {
         Ok(())
     }
 
-    /// What is at a place, where what lies between two heights would carry the avatar.
+    /// Examines a place. Surfaces within `reach`, a range of heights, would support the avatar.
     fn look(&self, map: &SliceMap, [x, y]: [f64; 2], reach: [f64; 2]) -> Result<Look, Unloaded> {
         let grid = map.grid();
         let [w, d] = grid.up.across(self.avatar.options().base).map(|side| 0.5 * side);
@@ -236,8 +239,8 @@ impl Walker {
         let [least, most] = reach.map(|height| grid.level_at(height));
         let last = i64::from(grid.counts[2]) - 1;
         let (mut found, mut is_over) = (nothing, false);
-        // From the highest that can be climbed downwards, until a floor is found.
-        // The lowest level is below what carries.
+        // From the highest slice that can be climbed downwards, until a floor is found. The lowest
+        // level of the range is excluded.
         let carrying = (least + 1).div_euclid(SLICE).max(0)..=most.div_euclid(SLICE).min(last);
         for s in carrying.rev() {
             let s = u32::try_from(s).unwrap_or(0);
@@ -271,7 +274,7 @@ impl Walker {
         }
         let head = found.support.unwrap_or(self.place[2]) + self.avatar.options().height;
         let crown = grid.level_at(head);
-        // What is above all that can be climbed, be it in the slice where the climb ends.
+        // Things above the range of climbing, also in the slice where it ends.
         let lowest = most.div_euclid(SLICE) + i64::from(!is_over);
         for s in lowest.max(0)..=crown.div_euclid(SLICE).min(last) {
             let [over, below_head] = [most, crown].map(|level| level - s * SLICE);
@@ -296,8 +299,8 @@ impl Walker {
     }
 }
 
-/// Whether anything in these pixels tops a level and begins at another or lower: a ceiling above the head
-/// does not.
+/// Returns `true` if any of these pixels has its top above level `over` and its bottom at most at
+/// `level`. A ceiling above the head does not count.
 fn reaches(slice: &Slice, [columns, rows]: [&RangeInclusive<u32>; 2], [over, level]: [i64; 2]) -> bool {
     rows.clone().any(|row| {
         let mut contents = columns.clone().filter_map(|column| slice.pixel(column, row));
@@ -305,14 +308,15 @@ fn reaches(slice: &Slice, [columns, rows]: [&RangeInclusive<u32>; 2], [over, lev
     })
 }
 
-/// Levels of a slice that would carry the avatar.
+/// Levels of a slice that would support the avatar.
 struct Span {
     from: i64,
     to: i64,
 }
 
 impl Span {
-    /// Whether any top is above, and the greatest top within, both of a row; as levels.
+    /// Returns whether any top of a row is above the span, and the greatest top within it, as a
+    /// level.
     #[inline]
     fn greatest(&self, tops: &[u8]) -> (bool, Option<u8>) {
         let [from, to] = [self.from, self.to].map(|level| u8::try_from(level + 1).unwrap_or(0));
@@ -325,7 +329,7 @@ impl Span {
         (most > to, if greatest >= from.max(1) { Some(greatest - 1) } else { None })
     }
 
-    /// The greatest top within among some of a row.
+    /// Returns the greatest top within the span among some pixels of a row.
     fn greatest_where(&self, tops: &[u8], mut is_wanted: impl FnMut(usize) -> bool) -> Option<u8> {
         let tops = tops.iter().enumerate().filter(|&(i, &top)| top > 0 && is_wanted(i));
         let levels = tops.map(|(_, top)| top - 1);
@@ -337,11 +341,11 @@ fn to_u32(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
 
-/// A step of every walker towards its own target, on all cores with the feature `rayon`; the same on any
-/// number of threads.
+/// Takes a step of every walker towards its own target, on all cores with the feature `rayon`. The
+/// result does not depend on the number of threads.
 ///
 /// # Panics
-/// When there are not as many targets and steps as walkers.
+/// If the numbers of walkers, targets and steps differ.
 pub fn step_each(
     map: &SliceMap,
     walkers: &mut [Walker],

@@ -1,64 +1,65 @@
-//! The reasons why a walk is refused.
+//! Errors of walking.
 
 use thiserror::Error;
 
 use crate::map::Unloaded;
 
-/// Why nobody walks.
+/// The reason why a walk or a search is rejected.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum WalkError {
-    /// A length that is none.
-    #[error("{what} of {length} is none; give a length above 0")]
+    /// A length is not positive and finite.
+    #[error("expected {what} above 0, got {length}")]
     Length {
-        /// Which.
+        /// The name of the length.
         what: &'static str,
-        /// As given.
+        /// The given value.
         length: f64,
     },
-    /// A length so short that a walk would not end while anybody waits.
+    /// A length is so short that a walk would take too long.
     #[error(
-        "with {what} of {length} the route may take {steps:e} steps, more than 2^32; give a greater length"
+        "expected a route of at most 2^32 steps, got {steps:e} with {what} of {length}; give a greater length"
     )]
     TooShort {
-        /// Which.
+        /// The name of the length.
         what: &'static str,
-        /// As given.
+        /// The given value.
         length: f64,
-        /// How many.
+        /// The number of steps.
         steps: f64,
     },
-    /// An avatar that climbs over its own head.
-    #[error("an avatar {height} high cannot climb {climb}; give less than its height")]
+    /// The climb is not below the avatar's height.
+    #[error("expected a climb below the avatar's height, {height}, got {climb}")]
     Climb {
-        /// Of the avatar.
+        /// The avatar's height.
         height: f64,
-        /// As given.
+        /// The given value.
         climb: f64,
     },
-    /// A place that is not finite.
-    #[error("point {index} of the route has a coordinate that is not finite")]
+    /// A place is not finite.
+    #[error("expected finite coordinates, got one that is not finite (point {index} of the route)")]
     NotFinite {
-        /// Which, the start being 0.
+        /// The point, with the start as 0.
         index: usize,
     },
-    /// A place so far off the map that a walk would not end while anybody waits.
-    #[error("point {index} of the route is {away:.2e} off the map; give one on it")]
+    /// A place is so far off the map that a walk would take too long.
+    #[error("expected a point on the map, got one {away:.2e} off the map (point {index} of the route)")]
     FarOff {
-        /// Which, the start being 0.
+        /// The point, with the start as 0.
         index: usize,
-        /// How far, along an axis.
+        /// Distance from the map along an axis.
         away: f64,
     },
-    /// Nobody can stand there.
+    /// The start is blocked.
     #[error(
-        "the start {place:?} is inside an obstacle or too low under a ceiling; start elsewhere, or with a smaller avatar"
+        "expected a free start, got {place:?}, inside an obstacle or too low under a ceiling; start elsewhere, or with a \
+         smaller avatar"
     )]
     Blocked {
-        /// As given.
+        /// The given value.
         place: [f64; 3],
     },
-    /// A search over more places than memory is meant to hold.
+    /// The search has more places than memory should hold.
     #[error("expected at most {limit} places to search, got more with steps of {step}; give a longer step")]
     TooManyPlaces {
         /// The greatest number of places.
@@ -66,7 +67,7 @@ pub enum WalkError {
         /// The length of a step.
         step: f64,
     },
-    /// A search that would not end while anybody waits.
+    /// The search would take too long.
     #[error(
         "expected a search of at most 2^36 pixels, got {places} places with {pixels} pixels under the base; give a \
          longer step or a smaller avatar"
@@ -77,7 +78,7 @@ pub enum WalkError {
         /// Pixels of the map under a base.
         pixels: u64,
     },
-    /// A slice that is needed is not loaded.
+    /// A required slice is not loaded.
     #[error(transparent)]
     Unloaded(#[from] Unloaded),
 }

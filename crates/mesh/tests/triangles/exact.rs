@@ -38,7 +38,7 @@ fn differences<T: Exact>(a: &[Vector<T>; 3], b: &[Vector<T>; 3]) -> Vec<Vector<T
     a.iter().flat_map(|p| b.iter().map(|q| minus(p, q))).collect()
 }
 
-/// Whether the triangles share a point.
+/// Returns `true` if the triangles share a point.
 pub(crate) fn meet<T: Exact>(a: &[Vector<T>; 3], b: &[Vector<T>; 3]) -> bool {
     let points = differences(a, b);
     let n = points.len();
@@ -65,7 +65,7 @@ fn in_segment<T: Exact>(p: &Vector<T>, q: &Vector<T>) -> bool {
     cross(p, q).iter().all(T::is_zero) && !dot(p, q).is_positive()
 }
 
-/// Whether the foot of the origin in the plane of three points lies in their triangle.
+/// Returns `true` if the foot of the origin in the plane of three points lies in their triangle.
 fn foot_in_triangle<T: Exact>(points: [&Vector<T>; 3], normal: &Vector<T>) -> bool {
     (0..3).all(|i| {
         let edge = cross(points[(i + 1) % 3], points[(i + 2) % 3]);
@@ -124,7 +124,7 @@ fn integers(triangles: [&Corners; 2]) -> ([[Vector<BigInt>; 3]; 2], i32) {
     (triangles.map(|t| t.map(|p| p.map(integer))), -exponent)
 }
 
-/// Whether triangles with any finite coordinates share a point.
+/// Returns `true` if triangles with any finite coordinates share a point.
 pub(crate) fn floats_meet(a: &Corners, b: &Corners) -> bool {
     let ([a, b], _) = integers([a, b]);
     meet(&a, &b)
