@@ -1,4 +1,4 @@
-//! `slices`: a building as a stack of images, and what is asked of it.
+//! `slices`: a building as a stack of images, and queries of it.
 
 mod avatar_args;
 mod build;
@@ -58,21 +58,21 @@ Example, a route that is found and then walked:
   nearmiss slices route building.slices --from 3,4,0 --to 12,7,3.2 -o route.json
   nearmiss slices walk building.slices --route route.json --image walk.png";
 
-/// What can be done with slice maps.
+/// The subcommands of `slices`.
 #[derive(Debug, Clone, Subcommand)]
 pub enum SlicesCommand {
-    /// Make a slice map of a point cloud or mesh
+    /// Build a slice map of a point cloud or mesh
     #[command(after_long_help = BUILD_EXAMPLES)]
     Build(BuildArgs),
-    /// Say what a slice map holds, its bounds, and its storeys
+    /// Report the size, bounds and storeys of a slice map
     Inspect(SlicesInspectArgs),
-    /// Whether boxes, or another map in some poses, meet anything, and how high the floor is
+    /// Test boxes, or another map in given poses, for collision, and find the floor below
     #[command(after_long_help = QUERY_EXAMPLES)]
     Query(QueryArgs),
     /// Find a place where an avatar can stand
     #[command(after_long_help = START_EXAMPLES)]
     Start(StartArgs),
-    /// Find everywhere that an avatar can walk to
+    /// Find all places that an avatar can walk to
     #[command(after_long_help = REACH_EXAMPLES)]
     Reach(ReachArgs),
     /// Find a short walkable route between two places
@@ -81,7 +81,7 @@ pub enum SlicesCommand {
     /// Walk an avatar along a route
     #[command(after_long_help = WALK_EXAMPLES)]
     Walk(WalkArgs),
-    /// Write the slices as images, as the paper encodes them
+    /// Write the slices as images, encoded as in Anjos et al. 2012
     Export(SlicesExportArgs),
 }
 

@@ -38,7 +38,7 @@ const WAVE: usize = 16;
 #[derive(Debug)]
 pub struct SliceBuilder {
     plan: SlicePlan,
-    /// One layer for each slice.
+    /// A layer for each slice.
     layers: Vec<Layer>,
     points: u64,
     left_out: u64,

@@ -257,7 +257,7 @@ impl Building for SliceCache {
 #[derive(Debug)]
 struct Loader {
     wanted: Arc<Mutex<VecDeque<u32>>>,
-    /// One message for each requested slice.
+    /// A message for each requested slice.
     calls: Sender<()>,
     loaded: Receiver<(u32, Result<Slice, StoreError>)>,
 }

@@ -19,9 +19,9 @@ pub(crate) type Cell = u16;
 /// The voxels of a slice.
 #[derive(Debug)]
 pub(crate) struct Layer {
-    /// One cell for each pixel.
+    /// A cell for each pixel.
     cells: Room<Cell>,
-    /// One bit for each cell, set if it is occupied; most are not.
+    /// A bit for each cell, set if it is occupied; most are not.
     filled: Room<u64>,
 }
 

@@ -15,9 +15,7 @@ const UPRIGHT: f64 = 1e-6;
 #[non_exhaustive]
 pub enum ObjectError {
     /// The pose tilts the object.
-    #[error(
-        "expected a pose that turns about the axis that points up only, got a tilt of {degrees} degrees"
-    )]
+    #[error("expected a pose that turns about the axis that points up only, got a tilt of {degrees} degrees")]
     Tilted {
         /// Angle between the posed axis and the building's.
         degrees: f64,

@@ -11,8 +11,7 @@ use crate::{Grid, Up};
 /// Greatest number of pixels of a slice, and of slices.
 const MOST: f64 = 2_147_483_648.0;
 
-/// Limit of ε for estimated noise: a voxel whose points span more than this share of a slice is
-/// always an obstacle.
+/// Limit of ε with estimated noise; the slope alone may exceed it.
 pub(crate) const MOST_SHARE: f64 = 0.9;
 
 /// Overhead of the allocator for the eight allocations of a slice: sixteen bytes each, and as much
@@ -58,8 +57,8 @@ pub enum Obstacle {
         /// θ, above 0 and below 90 degrees.
         degrees: f64,
         /// Height that the points of a level floor spread over within a pixel, in the units of the
-        /// points; estimated from the points if `None`. Estimated noise makes ε at most 0.9, since
-        /// otherwise walls would become floors
+        /// points; estimated from the points if `None`. Estimated noise never makes ε more than
+        /// 0.9, since otherwise walls would become floors
         /// ([`About::is_noise_capped`](crate::About::is_noise_capped)).
         noise: Option<f64>,
     },

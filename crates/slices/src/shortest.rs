@@ -165,7 +165,7 @@ struct Search<'a> {
     steps: Steps<'a>,
     start: Walker,
     goal: Walker,
-    /// One entry for each node of the graph.
+    /// An entry for each node of the graph.
     known: Vec<Known>,
     open: BinaryHeap<Open>,
     end: Option<End>,

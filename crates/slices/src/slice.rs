@@ -1,4 +1,4 @@
-//! One image: the occupied pixels, their heights, and the obstacles among them.
+//! The image of a slice: the occupied pixels, their heights, and the obstacles among them.
 
 use std::ops::{Range, RangeInclusive};
 

@@ -107,7 +107,9 @@ pub enum StoreError {
 /// with a word of `unfit` are replaced.
 fn of_map(cause: &OpenError, unfit: &[&str]) -> String {
     let what = match &cause.fault {
-        ContainerFault::NotAContainer { .. } => "expected a file of a slice map, got another format".to_owned(),
+        ContainerFault::NotAContainer { .. } => {
+            "expected a file of a slice map, got another format".to_owned()
+        }
         fault => match fault.to_string().rsplit_once("; ") {
             Some((what, remedy)) if unfit.iter().any(|word| remedy.contains(word)) => what.to_owned(),
             _ => return cause.to_string(),
@@ -162,10 +164,16 @@ impl SliceFolder {
             && grid.counts.iter().all(|n| *n > 0)
             && u64::from(grid.counts[0]) * u64::from(grid.counts[1]) <= 1 << 31;
         if !is_sound {
-            return Err(StoreError::Index { path, what: "expected a valid lattice, got sizes or counts out of range" });
+            return Err(StoreError::Index {
+                path,
+                what: "expected a valid lattice, got sizes or counts out of range",
+            });
         }
         if checksums.len() != grid.counts[2] as usize {
-            return Err(StoreError::Index { path, what: "expected a checksum for each slice, got another number of checksums" });
+            return Err(StoreError::Index {
+                path,
+                what: "expected a checksum for each slice, got another number of checksums",
+            });
         }
         Ok(Self { folder: folder.to_owned(), index, checksums: checksums.as_ref().into() })
     }

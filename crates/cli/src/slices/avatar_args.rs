@@ -12,23 +12,25 @@ use crate::input::pieces;
 use crate::parse::parse_length;
 use crate::{output, picture};
 
-/// The avatar, as for `slices walk`.
+/// Options of the avatar, as for `slices walk`.
 #[derive(Debug, Clone, Args)]
 pub struct AvatarArgs {
     /// Width, depth and height of the avatar
     #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.6", value_parser = parse_avatar)]
     pub avatar: AvatarBox,
-    /// Height that it climbs at once
+    /// Height that the avatar climbs at once
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
     pub climb: f64,
-    /// Length of a step, and distance of the places that are looked at; at most the lesser side of the
-    /// avatar's base; by default a pixel's side
+    /// Length of a step; by default a pixel's side
+    ///
+    /// It is also the distance between searched places. The lesser side of the avatar's base limits
+    /// it.
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
     pub step: Option<f64>,
 }
 
 impl AvatarArgs {
-    /// The avatar for a map.
+    /// Returns the avatar for a map.
     pub(super) fn avatar(&self, grid: &Grid) -> Result<Avatar, CliError> {
         let AvatarBox([width, depth, height]) = self.avatar;
         let options = AvatarOptions::default()
@@ -70,7 +72,7 @@ pub(super) fn parse_spot(text: &str) -> Result<Spot, String> {
     }
 }
 
-/// Opens a map and loads all of it; slices that are missing are warned of.
+/// Opens a map and loads all of it, with a warning for each missing slice.
 pub(super) fn load(folder: &Path, quiet: bool) -> Result<(SliceFolder, SliceMap), CliError> {
     let folder = open(folder)?;
     let _bar = Console::new(quiet).spinner("loading");
@@ -79,7 +81,7 @@ pub(super) fn load(folder: &Path, quiet: bool) -> Result<(SliceFolder, SliceMap)
     Ok((folder, map))
 }
 
-/// Refuses to write over the map, or two outputs to one file.
+/// Fails if an output would overwrite the map, or two outputs name one file.
 pub(super) fn check_outputs(
     folder: &Path,
     outputs: &[(&str, Option<&Path>)],
@@ -93,7 +95,9 @@ pub(super) fn check_outputs(
     for (i, (name, path)) in given.iter().enumerate() {
         output::check_apart(path, &inputs)?;
         if let Some((other, _)) = given[..i].iter().find(|(_, other)| output::is_same(path, other)) {
-            return Err(CliError::Usage(format!("{other} and {name} name the same file; name two")));
+            return Err(CliError::Usage(format!(
+                "expected two files for {other} and {name}, got the same file"
+            )));
         }
     }
     image.map_or(Ok(()), picture::check_name)

@@ -1,4 +1,4 @@
-//! `slices build`.
+//! `slices build`: builds a slice map.
 
 use std::path::{Path, PathBuf};
 
@@ -18,11 +18,13 @@ use crate::{input, output};
 /// Options of `slices build`.
 #[derive(Debug, Clone, Args)]
 pub struct BuildArgs {
-    /// Point cloud (PLY, PCD, LAS, LAZ, E57, NPY or text), read piece by piece, so it may be larger than
-    /// memory; or mesh (OBJ, STL, OFF, glTF, PLY with faces), whose surface is sampled so that no pixel of it
-    /// stays empty
+    /// Point cloud or mesh
+    ///
+    /// A point cloud (PLY, PCD, LAS, LAZ, E57, NPY or text) is read in pieces, so it may be larger
+    /// than memory. The surface of a mesh (OBJ, STL, OFF, glTF, PLY with faces) is sampled so that
+    /// no pixel of it stays empty.
     pub input: PathBuf,
-    /// Folder for the map: new, empty, or with a map, which is replaced
+    /// Folder for the map: new, empty, or with a map to replace
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Size of pixels
@@ -31,39 +33,47 @@ pub struct BuildArgs {
     /// Height of a slice; by default three pixels
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
     pub slice_height: Option<f64>,
-    /// What spans more than this share of a slice upwards, within a pixel, is an obstacle; 0.07 is the
-    /// paper's rule
+    /// Share of a slice that an obstacle spans upwards within a pixel
+    ///
+    /// Anjos et al. 2012 use 0.07. By default, --max-slope and --noise decide.
     #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["max_slope", "noise"])]
     pub obstacle: Option<f64>,
-    /// What is steeper than this is an obstacle, in degrees
+    /// Slope above which a surface is an obstacle, in degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, default_value_t = 45.0)]
     pub max_slope: f64,
-    /// How far points of a level floor spread upwards within a pixel; by default 0 for a mesh, and estimated
-    /// from points, of which no more counts than makes 90 % of a slice an obstacle
+    /// Height that points of a level floor spread over within a pixel
+    ///
+    /// By default, it is 0 for a mesh and estimated for points. An estimate counts only up to the
+    /// noise that makes 90 % of a slice an obstacle.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
-    /// Which way is up: x, y, z, -x, -y or -z
+    /// Axis that points up: x, y, z, -x, -y or -z
     #[arg(long, value_name = "AXIS", default_value = "z", allow_hyphen_values = true)]
     pub up: Up,
-    /// Format of the input: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf, or auto, by content and name
+    /// Format of the input: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf or auto
+    ///
+    /// With auto, the content and the name of the file decide.
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
-    /// How much memory may be used
+    /// The memory limit
     #[command(flatten)]
     pub memory: MemoryArgs,
-    /// Threads to work on, 0 for all cores; the result is the same
+    /// Threads; 0 for all cores
+    ///
+    /// The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub threads: usize,
-    /// One object of JSON instead of sentences; its points are all that are in the map, those that are given
-    /// twice twice
+    /// Print one JSON object instead of sentences
+    ///
+    /// Its number of points includes duplicates.
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// How large pixels are.
+/// Options for the size of a pixel.
 #[derive(Debug, Clone, Copy, Args)]
 #[group(multiple = false)]
 pub struct PixelArgs {
@@ -78,13 +88,14 @@ pub struct PixelArgs {
 /// Bytes of a file that are read at a time.
 const BLOCK: usize = 1 << 22;
 
-/// Fewer different points than this make no cloud.
+/// Least number of distinct points of a cloud.
 const LEAST_POINTS: usize = 8;
 
 pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let start = now();
-    // What needs no points is refused before they are read, which may take minutes.
+    // Options that can be checked without points are checked before reading, which may take
+    // minutes.
     options(args, false).check().map_err(|cause| CliError::Usage(cause.to_string()))?;
     input::check_raw(&args.input)?;
     let target = SliceTarget::new(&args.output)?;
@@ -137,7 +148,8 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     Report::new(&folder, start.elapsed()).tell(&folder, args.json)
 }
 
-/// Where the voxels lie: in memory, or on disk if `--memory` was given and they need more.
+/// Chooses where the voxels are kept: in memory, or on disk if `--memory` was given and they need
+/// more.
 fn place(
     args: &BuildArgs,
     options: &SliceOptions,
@@ -149,7 +161,7 @@ fn place(
     let plan = SlicePlan::new(options, bounds);
     let Some(memory) = args.memory.memory.filter(|_| matches!(plan, Err(SliceError::Memory { .. }))) else {
         let plan = plan.map_err(unfit)?;
-        // Clears up after a run on disk that was killed.
+        // Removes the files of a killed run on disk.
         Workspace::clear(&folder);
         return Ok((plan, Workspace::in_memory()));
     };
@@ -160,8 +172,8 @@ fn place(
     Ok((plan, work))
 }
 
-/// The bounds of all points that are finite, of which there must be enough for a cloud; and how many points
-/// there are.
+/// Returns the bounds of all finite points and the number of all points. Fails if there are too few
+/// points for a cloud.
 fn bounds(path: &Path, points: &PointPieces, bar: &Bar) -> Result<(Aabb, u64), CliError> {
     let mut bounds = Aabb::EMPTY;
     let mut distinct: Vec<[f64; 3]> = Vec::with_capacity(LEAST_POINTS);
@@ -191,7 +203,7 @@ fn options(args: &BuildArgs, is_mesh: bool) -> SliceOptions {
     let obstacle = match args.obstacle {
         Some(share) => Obstacle::Share(share),
         None => {
-            // What is sampled for the map lies where the mesh is.
+            // Samples of a mesh are exactly on its surface.
             let of_mesh = is_mesh.then_some(0.0);
             Obstacle::Slope { degrees: args.max_slope, noise: args.noise.or(of_mesh) }
         }

@@ -1,4 +1,4 @@
-//! `slices export`: the paper's images.
+//! `slices export`: writes the images of Anjos et al. 2012.
 
 use std::path::PathBuf;
 
@@ -15,11 +15,13 @@ use crate::image::Picture;
 pub struct SlicesExportArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// Folder for the images, `slice-0000.png` the lowest; made if it is not there, and what else is in it
-    /// stays, images of other maps too
+    /// Folder for the images; made if missing
+    ///
+    /// The lowest slice is `slice-0000.png`. Other files in the folder stay, including images of
+    /// other maps.
     #[arg(short, long, value_name = "FOLDER")]
     pub output: PathBuf,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
@@ -51,7 +53,7 @@ pub(super) fn run(args: &SlicesExportArgs) -> Result<(), CliError> {
         args.output.display()
     ))?;
     results.flush()?;
-    // The others serve.
+    // The other slices are usable.
     let last = faults.pop();
     faults.iter().for_each(console::warn);
     last.map_or(Ok(()), |fault| Err(fault.into()))

@@ -1,4 +1,4 @@
-//! `slices inspect`.
+//! `slices inspect`: reports on a slice map.
 
 use std::path::PathBuf;
 
@@ -17,10 +17,10 @@ pub struct SlicesInspectArgs {
     /// Load every slice and check that it is the one that was saved
     #[arg(long)]
     pub verify: bool,
-    /// One object of JSON instead of sentences
+    /// Print one JSON object instead of sentences
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
@@ -38,13 +38,13 @@ pub(super) fn run(args: &SlicesInspectArgs) -> Result<(), CliError> {
             return Err(fault.into());
         }
     }
-    // Somebody as large as the default of the other commands.
+    // The default avatar of the other commands.
     let options = AvatarOptions::default();
     let avatar = Avatar::new(&options).map_err(|e| CliError::Usage(e.to_string()))?;
     let bar = Console::new(args.quiet).spinner("looking for floors");
     let storeys = folder.storeys(&avatar);
     drop(bar);
-    let storeys = storeys.map_err(|fault| console::warn(format_args!("no floors are told: {fault}"))).ok();
+    let storeys = storeys.map_err(|fault| console::warn(format_args!("cannot find floors: {fault}"))).ok();
     let detail = Detail::new(folder.grid(), storeys.as_deref());
     Report::new(&folder, start.elapsed()).with_detail(detail).tell(&folder, args.json)
 }

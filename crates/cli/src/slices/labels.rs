@@ -1,13 +1,13 @@
-//! Letters that do not lie over each other.
+//! Placement of labels without overlap.
 
 use crate::canvas::Area;
 
-/// Where letters are already.
+/// The areas of the labels that are placed already.
 #[derive(Default)]
 pub(super) struct Labels(Vec<Area>);
 
 impl Labels {
-    /// Whether there is room for letters here, which they take.
+    /// Claims an area for a label. Returns `true` if it is free.
     pub(super) fn has_room(&mut self, area: Area) -> bool {
         let ends = |a: &Area| [a.left + a.width, a.top + a.height];
         let [right, bottom] = ends(&area);

@@ -1,4 +1,4 @@
-//! `slices query`: boxes, or another map in some poses.
+//! `slices query`: tests boxes, or another map in given poses.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::digits::{count, short};
 use crate::error::CliError;
 use crate::input::TextLines;
 
-/// A pose may be off a rotation by so much of the object's pixels.
+/// Tolerance of a rotation in a pose, in pixels of the object.
 const OFF: f64 = 0.1;
 
 /// Options of `slices query`.
@@ -22,25 +22,27 @@ const OFF: f64 = 0.1;
 pub struct QueryArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// Boxes, a line `{"min":[x,y,z],"max":[x,y,z]}` each
+    /// Boxes, one line `{"min":[x,y,z],"max":[x,y,z]}` each
     #[arg(long, value_name = "FILE.jsonl")]
     pub boxes: Option<PathBuf>,
-    /// Another map, to be held against this one in the poses of --poses
+    /// Another map to test against this one in the poses of --poses
     #[arg(long, value_name = "DIR", requires = "poses")]
     pub map: Option<PathBuf>,
-    /// Poses about the axis that points up, a line `{"a":[16 numbers],"b":[16 numbers]}` each: a of this map
-    /// (may be left out), b of the other
+    /// Poses of --map about the axis that points up
+    ///
+    /// Each is a line `{"a":[16 numbers],"b":[16 numbers]}`, where `a` is the pose of this map
+    /// (optional) and `b` that of the other.
     #[arg(long, value_name = "FILE.jsonl", requires = "map")]
     pub poses: Option<PathBuf>,
-    /// The floor under a base: its highest pixel, or the mean of all
+    /// Floor under a base: its highest pixel, or the mean of all
     #[arg(long, value_enum, default_value_t = FloorName::Max)]
     pub floor: FloorName,
-    /// One object of JSON a line instead of sentences
+    /// Print one JSON object a query
     #[arg(long)]
     pub json: bool,
 }
 
-/// What the floor is, by name.
+/// The names of the kinds of floor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FloorName {
     /// The highest pixel
@@ -85,7 +87,7 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         Ok(found) if args.json => results.json(&Answer { found, micros }),
         Ok(found) => results.line(sentence(&found)),
         Err(ObjectError::Unloaded(cause)) => {
-            // The others serve; this one is null, and the command fails in the end.
+            // The other answers are valid; this one is null, and the command fails at the end.
             failed.get_or_insert(cause);
             let text = format!("Cannot tell: {cause}.");
             if args.json { results.json(&serde_json::Value::Null) } else { results.line(text) }
@@ -96,7 +98,10 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         each_line(path, BOX_LINE, |line: BoxLine| {
             let bounds = Aabb { min: line.min, max: line.max };
             if !(0..3).all(|k| bounds.min[k] <= bounds.max[k]) {
-                return Err("the box is empty: min is greater than max".into());
+                return Err(format!(
+                    "expected min at most max, got min {:?} and max {:?}",
+                    line.min, line.max
+                ));
             }
             let start = now();
             let found = map.query(&bounds, floor);
@@ -107,7 +112,7 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         let folder = open(other)?;
         let (object, more) = folder.load_all();
         faults.extend(more);
-        // All of an object is needed, wherever it is held.
+        // Every query needs the whole object.
         folders.insert(0, folder);
         each_line(path, POSE_LINE, |line: PoseLine| {
             let pose = pose(&line, &map, &object)?;
@@ -129,7 +134,7 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
     cause.map_or(Ok(()), |cause| Err(cause.into()))
 }
 
-/// Why a slice is not there.
+/// Returns the error of a missing slice.
 fn why(folders: &[SliceFolder], Unloaded { slice }: Unloaded) -> Option<StoreError> {
     let with_it = folders.iter().filter(|folder| slice < folder.grid().counts[2]);
     with_it.filter_map(|folder| folder.load(slice).err()).next()
@@ -138,7 +143,7 @@ fn why(folders: &[SliceFolder], Unloaded { slice }: Unloaded) -> Option<StoreErr
 const BOX_LINE: &str = r#"a box is {"min":[x,y,z],"max":[x,y,z]}"#;
 const POSE_LINE: &str = r#"a pose line is {"a":[16 numbers],"b":[16 numbers]}"#;
 
-/// Reads each line and answers it; what is wrong with a line is said with its number.
+/// Reads and answers each line; errors name the number of the line.
 fn each_line<L: for<'a> Deserialize<'a>>(
     path: &Path,
     form: &str,
@@ -158,7 +163,7 @@ fn each_line<L: for<'a> Deserialize<'a>>(
     if is_empty { Err(lines.unfit(format!("holds no lines; {form}"))) } else { Ok(()) }
 }
 
-/// The object's pose in the building.
+/// Returns the object's pose in the building.
 fn pose(line: &PoseLine, map: &SliceMap, object: &SliceMap) -> Result<Pose, String> {
     let read = |matrix: &[f64; 16], map: &SliceMap| {
         let grid = map.grid();
@@ -182,7 +187,7 @@ fn micros(start: std::time::Instant) -> f64 {
     nanos / 1e3
 }
 
-/// For people.
+/// Formats an answer as text.
 fn sentence(found: &Occupancy) -> String {
     let what = match (found.collides, found.obstacle) {
         (false, _) => "Free".to_owned(),

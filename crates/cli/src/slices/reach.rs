@@ -1,4 +1,4 @@
-//! `slices reach`: everywhere that an avatar can walk to.
+//! `slices reach`: finds all places that an avatar can walk to.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -21,33 +21,33 @@ use crate::output;
 pub struct ReachArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// The feet of the avatar, within a climb of something that carries it
+    /// Place of the feet, within a climb of something that supports the avatar
     #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub start: Spot,
     /// The avatar
     #[command(flatten)]
     pub avatar: AvatarArgs,
-    /// Also go where the avatar falls on the way, and lands on something
+    /// Let the avatar fall on the way, if it lands on something
     #[arg(long)]
     pub falls: bool,
-    /// Picture, as PNG: the storeys from above, with the places within reach
+    /// Draw the storeys from above with the places within reach, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
-    /// A line a place of the feet: x,y,z
+    /// Write the places of the feet, one line x,y,z each
     #[arg(long, value_name = "OUT.csv")]
     pub csv: Option<PathBuf>,
-    /// One object of JSON instead of sentences
+    /// Print one JSON object instead of sentences
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// What is told.
+/// The JSON output.
 #[derive(Debug, Serialize)]
 struct ReachReport {
-    /// The feet, where they were put down.
+    /// The place of the feet at the start.
     start: [f64; 3],
     places: usize,
     area: f64,
@@ -60,7 +60,7 @@ struct ReachReport {
 /// A storey of the map.
 #[derive(Debug, Serialize)]
 struct FloorReach {
-    /// Of its floor, in the frame of the input; none if the map has no floor.
+    /// Height of its floor, in the frame of the input; `None` if the map has no floor.
     height: Option<f64>,
     places: u64,
     area: f64,

@@ -1,4 +1,4 @@
-//! The reach of an avatar from above, a view a storey.
+//! The picture of an avatar's reach from above, with a view for each storey.
 
 use nearmiss::slices::{Avatar, Reach, SliceMap, Storey, storey_of};
 
@@ -12,13 +12,13 @@ const REACHED: Colour = [120, 176, 226];
 
 /// Places to mark, in the frame of the input.
 pub(super) struct Marks<'a> {
-    /// The feet at the start.
+    /// The place of the feet at the start.
     pub(super) start: [f64; 3],
-    /// Others, with their names.
+    /// Other places, with their names.
     pub(super) others: &'a [([f64; 3], &'a str)],
 }
 
-/// A view for each storey that the avatar gets to, or that has a mark, lowest first.
+/// Draws a view for each storey that the avatar reaches or that has a mark, lowest first.
 pub(super) fn paint(
     map: &SliceMap,
     avatar: &Avatar,

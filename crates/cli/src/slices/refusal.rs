@@ -1,4 +1,4 @@
-//! Why nobody walks from a place or to it, in a sentence.
+//! Error messages of places, searches and routes.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use nearmiss::slices::{Grid, RouteError, Standing, StartError, WalkError};
 use crate::digits::{rounded, short};
 use crate::error::CliError;
 
-/// A place as the options take it, to a hundredth of a pixel.
+/// Formats a place as the options take it, to a hundredth of a pixel.
 pub(super) fn told_place(place: [f64; 3], grid: &Grid) -> String {
     let told = place.map(|x| {
         let digits = rounded(x, 1e-2 * grid.pixel);
@@ -17,7 +17,7 @@ pub(super) fn told_place(place: [f64; 3], grid: &Grid) -> String {
     format!("[{}]", told.join(", "))
 }
 
-/// The refusal of a place, which `what` names, for a map or a route in `path`.
+/// Returns the error of a place, which `what` names, for a map or a route in `path`.
 pub(super) fn misplaced(path: &Path, what: &str, grid: &Grid, cause: &StartError) -> CliError {
     let unfit = |what: String| CliError::Unfit { path: path.to_owned(), what };
     match cause {
@@ -39,7 +39,7 @@ pub(super) fn misplaced(path: &Path, what: &str, grid: &Grid, cause: &StartError
     }
 }
 
-/// The refusal of a search.
+/// Returns the error of a search.
 pub(super) fn refused(path: &Path, cause: &WalkError) -> CliError {
     match cause {
         WalkError::TooManyPlaces { .. } | WalkError::TooMuchWork { .. } => CliError::Usage(cause.to_string()),
@@ -47,7 +47,7 @@ pub(super) fn refused(path: &Path, cause: &WalkError) -> CliError {
     }
 }
 
-/// The refusal of a route.
+/// Returns the error of a route.
 pub(super) fn no_route(path: &Path, grid: &Grid, cause: &RouteError) -> CliError {
     match cause {
         RouteError::Start(cause) => misplaced(path, "start", grid, cause),

@@ -1,4 +1,4 @@
-//! What is told of slice maps.
+//! Reports on slice maps.
 
 use std::path::Path;
 use std::time::Duration;
@@ -11,21 +11,21 @@ use crate::console::Results;
 use crate::digits::{count, place, rounded, short};
 use crate::error::CliError;
 
-/// A storey, as it is told.
+/// A storey of a report.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct FloorReport {
-    /// Along the axis that points up, in the caller's coordinates.
+    /// Height along the axis that points up, in the caller's coordinates.
     height: f64,
-    /// In square units.
+    /// Area in square units.
     area: f64,
 }
 
-/// What `inspect` says beyond what `build` does.
+/// The part of a report that `inspect` adds.
 #[derive(Debug, Serialize)]
 pub(super) struct Detail {
     bounds: [[f64; 3]; 2],
     up: String,
-    /// Lowest first; none if a slice cannot be loaded.
+    /// Lowest first; `None` if a slice cannot be loaded.
     floors: Option<Vec<FloorReport>>,
 }
 
@@ -39,7 +39,7 @@ impl Detail {
     }
 }
 
-/// What `build` and `inspect` say of a map.
+/// The report of `build` and `inspect` on a map.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     slices: u32,
@@ -81,12 +81,12 @@ impl Report {
         }
     }
 
-    /// The same with bounds and storeys.
+    /// Adds bounds and storeys.
     pub(super) fn with_detail(self, detail: Detail) -> Self {
         Self { detail: Some(detail), ..self }
     }
 
-    /// As JSON, or for people.
+    /// Prints the report as JSON or as text.
     pub(super) fn tell(&self, folder: &SliceFolder, json: bool) -> Result<(), CliError> {
         let mut results = Results::new();
         if json {
@@ -132,7 +132,7 @@ impl Report {
     }
 }
 
-/// How the rule of a map reckons with noise, for people.
+/// Describes the noise that the rule of a map allows for.
 fn of_noise(about: &About) -> String {
     let noise = short(about.noise);
     match about.rule {

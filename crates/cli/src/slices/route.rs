@@ -1,4 +1,4 @@
-//! `slices route`: a short walkable route between two places.
+//! `slices route`: finds a short walkable route between two places.
 
 use std::path::{Path, PathBuf};
 
@@ -21,10 +21,12 @@ use crate::output;
 pub struct RouteArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// The feet at the start, within a climb of something that carries the avatar
+    /// Place of the feet at the start, within a climb of something that supports the avatar
     #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub from: Spot,
-    /// The feet at the goal, alike; the avatar ends within a climb of that height
+    /// Place of the feet at the goal, within a climb of something that supports the avatar
+    ///
+    /// The avatar ends within a climb of its height.
     #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub to: Spot,
     /// The avatar
@@ -33,32 +35,33 @@ pub struct RouteArgs {
     /// Let the avatar fall on the way
     #[arg(long)]
     pub falls: bool,
-    /// The route, for `slices walk --route` with the same avatar, climb and step
+    /// Write the route for `slices walk --route`, with the same avatar, climb and step
     #[arg(short, long, value_name = "ROUTE.json")]
     pub output: Option<PathBuf>,
-    /// Picture, as PNG: the walk along the route; if there is none, the places within reach
+    /// Draw the walk along the route, as PNG; without a route, the places within reach
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
-    /// One object of JSON instead of a sentence
+    /// Print one JSON object instead of a sentence
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// What is told.
+/// The JSON output.
 #[derive(Debug, Default, Serialize)]
 struct RouteReport<'a> {
     found: bool,
     route: Option<&'a Route>,
-    /// Along the ground.
+    /// Horizontal length of the route.
     length: Option<f64>,
-    /// Of the shortest way over the lattice.
+    /// Horizontal length of the shortest path on the lattice.
     lattice_length: Option<f64>,
-    /// Where the feet end.
+    /// The place where the feet end.
     end: Option<[f64; 3]>,
-    /// If there is none, the place within reach that is nearest to the goal, and how far it is from it.
+    /// Without a route, the place within reach that is nearest to the goal, and its distance from
+    /// the goal.
     nearest: Option<[f64; 3]>,
     away: Option<f64>,
     seconds: f64,
@@ -134,7 +137,7 @@ fn tell(args: &RouteArgs, grid: &Grid, found: &FoundRoute, seconds: f64) -> Resu
     results.flush()
 }
 
-/// The picture of the walk along the route.
+/// Draws the walk along the route.
 fn paint_walk(
     args: &RouteArgs,
     map: &SliceMap,
@@ -163,7 +166,7 @@ fn paint_walk(
     walk_picture::paint(map, &track, avatar, &storeys).save(path)
 }
 
-/// The picture of what is within reach, where there is no route.
+/// Draws the places within reach, if there is no route.
 fn paint_reach(
     args: &RouteArgs,
     map: &SliceMap,

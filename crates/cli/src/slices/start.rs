@@ -17,26 +17,27 @@ use crate::error::CliError;
 pub struct StartArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// The nearest place to here is wanted; by default one in the middle of the largest part of the lowest
-    /// floor that hangs together
+    /// Find the place nearest to this one
+    ///
+    /// By default, the result is the middle of the largest connected part of the lowest floor.
     #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub near: Option<Spot>,
     /// The avatar
     #[command(flatten)]
     pub avatar: AvatarArgs,
-    /// One object of JSON instead of a sentence
+    /// Print one JSON object instead of a sentence
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// What is told.
+/// The JSON output.
 #[derive(Debug, Serialize)]
 struct StartReport {
     position: [f64; 3],
-    /// From the place that was named.
+    /// The distance from `--near`.
     distance: Option<f64>,
     /// The storey, counted from 0, the lowest.
     floor: Option<usize>,

@@ -1,5 +1,5 @@
-//! A storey from above: what its pixels are to an avatar, with marks and names; and the sheet that
-//! storeys are laid out on.
+//! Views of storeys from above, with the kinds of pixels for an avatar, marks and names; and the
+//! sheet that holds the views.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::slices::{Avatar, AvatarOptions, SliceMap};
@@ -9,8 +9,8 @@ use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
 use crate::image::Picture;
 use crate::picture::scale_bar;
 
-/// In fine pixels: the longer side of a view, alone or one of several; margins, letters, lines of
-/// text.
+/// Sizes in fine pixels: the longer side of a single view and of one of several; the least width;
+/// margins, letters and lines of text.
 const ALONE: f64 = 900.0 * FINE as f64;
 const ONE_OF_MANY: f64 = 560.0 * FINE as f64;
 const LEAST_WIDTH: usize = 560 * FINE;
@@ -19,7 +19,7 @@ pub(super) const LETTER: usize = 2 * FINE;
 pub(super) const SMALL: usize = 3 * FINE / 2;
 pub(super) const LINE: usize = 22 * FINE;
 
-/// Views are laid out in a shape not far from this, width to height.
+/// Wanted ratio of width to height of all views together.
 const SHAPE: f64 = 1.3;
 
 const GROUND: Colour = [255, 255, 255];
@@ -31,18 +31,18 @@ pub(super) const AIM: Colour = [40, 90, 200];
 pub(super) const STOP: Colour = [150, 20, 150];
 pub(super) const INK: Colour = [30, 34, 40];
 
-/// What is shown around places: so many times the avatar's height, and this share of their extent.
+/// Margin around places: a multiple of the avatar's height plus a share of their extent.
 const AROUND: f64 = 1.5;
 const MORE: f64 = 0.1;
 
-/// Places that pixels are held against.
+/// Greatest number of places that a pixel is compared with.
 const SAMPLE: usize = 150;
 
-/// What of a map is shown: its least and its greatest corner.
+/// The part of a map that is shown: its least and its greatest corner.
 pub(super) type Window = [[f64; 2]; 2];
 
-/// The window around places, which must not be none: with a margin as far as there is a map, and as
-/// far as they go off it.
+/// Returns the window around at least one place: with a margin inside the map, and all places even
+/// if they are off the map.
 pub(super) fn window(
     map: &SliceMap,
     avatar: &Avatar,
@@ -55,7 +55,7 @@ pub(super) fn window(
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let margin = AROUND * avatar.options().height + MORE * extent;
     let end = |k: usize| grid.origin[k] + f64::from(grid.counts[k]) * grid.pixel;
-    // What is off the map is shown with enough around it for names and the scale.
+    // Places off the map get enough margin for names and the scale.
     let off = 0.5 * margin;
     [
         [0, 1].map(|k| (low[k] - margin).max(grid.origin[k].min(low[k] - off))),
@@ -63,17 +63,18 @@ pub(super) fn window(
     ]
 }
 
-/// Views of storeys side by side, with what is told of all above and a legend below.
+/// Views of storeys side by side, with a caption above and a legend below.
 pub(super) struct Sheet<'a> {
     pub(super) canvas: Canvas,
     views: Vec<View<'a>>,
-    /// Width, and where what comes below the views begins.
+    /// Width, and top of the part below the views.
     pub(super) full: usize,
     pub(super) below: usize,
 }
 
 impl<'a> Sheet<'a> {
-    /// A sheet with a view for each title, and `space` rows between the views and the legend.
+    /// Creates a sheet with a view for each title, and `space` rows between the views and the
+    /// legend.
     pub(super) fn new(
         (map, avatar): (&'a SliceMap, &'a Avatar),
         window: Window,
@@ -81,7 +82,7 @@ impl<'a> Sheet<'a> {
         entries: &[(Colour, &str)],
         space: usize,
     ) -> Self {
-        // So far off the map that nothing is around it.
+        // A window far off the map may have no extent.
         let size = [0, 1].map(|k| (window[1][k] - window[0][k]).max(map.grid().pixel));
         let side = if titles.len() == 1 { ALONE } else { ONE_OF_MANY };
         let scale = side / size[0].max(size[1]);
@@ -111,12 +112,12 @@ impl<'a> Sheet<'a> {
         Self { canvas, views, full, below }
     }
 
-    /// The view of the `i`-th title.
+    /// Returns the view of the `i`-th title.
     pub(super) fn view(&self, i: usize) -> View<'a> {
         self.views[i]
     }
 
-    /// The picture.
+    /// Returns the picture.
     pub(super) fn picture(mut self) -> Picture {
         if let Some(view) = self.views.first() {
             scale_bar(&mut self.canvas, &view.camera());
@@ -125,13 +126,13 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// One storey.
+/// A view of one storey.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
     map: &'a SliceMap,
     avatar: &'a Avatar,
     window: Window,
-    /// Fine pixels of a unit of length.
+    /// Fine pixels in a unit of length.
     scale: f64,
     pub(super) area: Area,
 }
@@ -153,37 +154,37 @@ impl View<'_> {
         [x, y]
     }
 
-    /// A square of the world around a place.
+    /// Fills a square of the world around a place.
     pub(super) fn square(&self, canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, colour: Colour) {
         let half = 0.5 * side;
         self.fill(canvas, [[x - half, y - half], [x + half, y + half]], colour);
     }
 
-    /// A rectangle of the world, at least a fine pixel.
+    /// Fills a rectangle of the world, at least one fine pixel.
     fn fill(&self, canvas: &mut Canvas, [low, high]: Window, colour: Colour) {
         let [x0, y0] = self.at([low[0], high[1]]);
         let [x1, y1] = self.at([high[0], low[1]]);
         let inside = |x: f64, from: usize, size: usize| whole(x.max(0.0)).clamp(from, from + size);
         let [left, right] = [x0, x1].map(|x| inside(x, self.area.left, self.area.width));
         let [top, bottom] = [y0, y1].map(|y| inside(y, self.area.top, self.area.height));
-        // Where several pixels share a fine one, the last is seen.
+        // If several pixels share a fine one, the last is visible.
         let (width, height) = ((right - left).max(1), (bottom - top).max(1));
         canvas.fill(Area { left, top, width, height }, colour);
     }
 
-    /// A cross where the avatar was stopped.
+    /// Draws a cross where the avatar was stopped.
     pub(super) fn cross(&self, canvas: &mut Canvas, place: [f64; 2]) {
         cross(canvas, self.area, self.at(place));
     }
 
-    /// A ring at a place that is gone to, with a name.
+    /// Draws a ring at a goal, with a name.
     pub(super) fn goal(&self, canvas: &mut Canvas, labels: &mut Labels, place: [f64; 2], name: &str) {
         let [x, y] = self.at(place);
         canvas.ring(self.area, [x, y], 9.0, 3.0, AIM);
         self.label(canvas, labels, [x + 14.0, y - 24.0], name);
     }
 
-    /// The avatar's base at a place, with a name.
+    /// Draws the avatar's base at a place, with a name.
     pub(super) fn base(&self, canvas: &mut Canvas, labels: &mut Labels, place: [f64; 2], name: &str) {
         let half = self.map.grid().up.across(self.avatar.options().base).map(|side| 0.5 * side);
         let corner = |s: f64, t: f64| self.at([place[0] + s * half[0], place[1] + t * half[1]]);
@@ -195,7 +196,8 @@ impl View<'_> {
         self.label(canvas, labels, [x + 4.0, y - 20.0], name);
     }
 
-    /// Letters that stay in the view, on a ground of their own, unless others are there.
+    /// Draws a label within the view, on a background of its own, unless it would cover another
+    /// label.
     fn label(&self, canvas: &mut Canvas, labels: &mut Labels, [x, y]: [f64; 2], text: &str) {
         let Area { left, top, width, height } = self.area;
         let long = Canvas::text_width(SMALL, text);
@@ -214,7 +216,7 @@ impl View<'_> {
         }
     }
 
-    /// What pixels are to an avatar that stands at the nearest of these places.
+    /// Colours each pixel by its kind for an avatar at the nearest of these places.
     pub(super) fn ground(&self, canvas: &mut Canvas, places: &[[f64; 3]]) {
         let here: Vec<[f64; 3]> =
             places.iter().copied().step_by(places.len().div_ceil(SAMPLE).max(1)).collect();
@@ -222,7 +224,7 @@ impl View<'_> {
         let [low, high] = self.window;
         let ranges = [0, 1].map(|k| grid.range(k, [low[k], high[k]]));
         let [Some(columns), Some(rows)] = ranges else { return };
-        // Of pixels finer than can be seen one speaks for its neighbours.
+        // If pixels are finer than a fine one, only one of several neighbours is drawn.
         let stride = whole((1.0 / (self.scale * grid.pixel)).max(1.0));
         let reach = u32::try_from(stride).unwrap_or(u32::MAX);
         for row in rows.step_by(stride) {
@@ -231,7 +233,8 @@ impl View<'_> {
                 let away = |p: &[f64; 3]| (p[0] - middle[0]).powi(2) + (p[1] - middle[1]).powi(2);
                 let nearest = here.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
                 let Some(colour) = nearest.and_then(|p| self.kind([column, row], p[2])) else { continue };
-                // Walls between pixels reckoned alike from both sides, so that no gap is left.
+                // Borders between pixels are computed alike from both sides, so that no gap is
+                // left.
                 let wall = |k: usize, i: u32| grid.origin[k] + f64::from(i) * grid.pixel;
                 let low = [wall(0, column), wall(1, row)];
                 let high = [wall(0, column.saturating_add(reach)), wall(1, row.saturating_add(reach))];
@@ -240,7 +243,7 @@ impl View<'_> {
         }
     }
 
-    /// What a column is to feet at this height.
+    /// Returns the colour of a column for feet at this height.
     fn kind(&self, [column, row]: [u32; 2], feet: f64) -> Option<Colour> {
         let grid = self.map.grid();
         let AvatarOptions { height, climb, .. } = *self.avatar.options();
@@ -260,7 +263,7 @@ impl View<'_> {
     }
 }
 
-/// A cross.
+/// Draws a cross.
 pub(super) fn cross(canvas: &mut Canvas, area: Area, [x, y]: [f64; 2]) {
     const ARM: f64 = 8.0;
     for side in [-1.0, 1.0] {
@@ -268,7 +271,8 @@ pub(super) fn cross(canvas: &mut Canvas, area: Area, [x, y]: [f64; 2]) {
     }
 }
 
-/// How many views beside each other come nearest to the shape, and leave little of it empty.
+/// Returns the number of columns of views that comes nearest to the wanted shape and leaves little
+/// of it empty.
 fn columns(views: usize, [width, height]: [usize; 2]) -> usize {
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let off = |columns: usize| {
@@ -279,12 +283,12 @@ fn columns(views: usize, [width, height]: [usize; 2]) -> usize {
     (1..=views).min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(1)
 }
 
-/// Width of an entry of the legend.
+/// Returns the width of an entry of the legend.
 fn entry_width(text: &str) -> usize {
     40 * FINE + Canvas::text_width(SMALL, text)
 }
 
-/// How many lines the legend takes.
+/// Returns the number of lines of the legend.
 fn rows(entries: &[(Colour, &str)], full: usize) -> usize {
     let mut left = GAP;
     let mut rows = 1;

@@ -1,42 +1,43 @@
-//! The way of a walk, for its picture.
+//! The path of a walk, for its picture.
 
 use std::collections::BTreeMap;
 
 use nearmiss::slices::{Grid, Route};
 
-/// Places of a way that are kept at most: far more than a picture shows.
+/// Greatest number of kept places, far more than a picture shows.
 const MOST: usize = 1 << 20;
 
-/// Stops that are kept at most.
+/// Greatest number of kept stops.
 const MOST_STOPS: usize = 1000;
 
-/// Where it went, in the map's coordinates, and how far that was: of longer ways every second place, every
-/// fourth, and so on.
+/// The places of a walk, in the map's coordinates, with their distances from the start. Of longer
+/// walks it keeps every second place, every fourth, and so on.
 pub(super) struct Track {
     /// The start first.
     pub(super) places: Vec<[f64; 3]>,
-    /// Along the ground, for each place.
+    /// Horizontal distance from the start, for each place.
     pub(super) distances: Vec<f64>,
     /// The points of the route, in the map's coordinates.
     pub(super) targets: Vec<[f64; 2]>,
-    /// Of each of them the number of the first one there, counted from 1.
+    /// For each of them the number of the first one at the same place, counted from 1.
     pub(super) numbers: Vec<usize>,
-    /// Distance and height where the first of them were reached in turn.
+    /// Distance and height where the points were reached, in turn, as far as they were.
     pub(super) reached: Vec<[f64; 2]>,
-    /// Places where it was stopped, with how far that was; each once in a row, the first ones.
+    /// Places where the avatar was stopped, with the distance; consecutive duplicates once, only
+    /// the first ones.
     pub(super) stops: Vec<([f64; 3], f64)>,
-    /// Steps from one place to the next.
+    /// Number of steps between kept places.
     every: usize,
-    /// Steps so far.
+    /// Number of steps so far.
     steps: usize,
 }
 
 impl Track {
-    /// A way that begins here.
+    /// Creates a track that begins at `start`.
     pub(super) fn new(route: &Route, grid: &Grid, start: [f64; 3]) -> Self {
         let targets: Vec<[f64; 2]> = route.points.iter().map(|p| grid.up.across(*p)).collect();
         let mut first = BTreeMap::new();
-        // Adding 0 makes one zero of both.
+        // Adding 0 turns -0 into 0.
         let bits = |target: [f64; 2]| target.map(|x| (x + 0.0).to_bits());
         let numbers = (1..).zip(&targets).map(|(i, target)| *first.entry(bits(*target)).or_insert(i));
         let numbers = numbers.collect();
@@ -55,7 +56,7 @@ impl Track {
         track
     }
 
-    /// Takes in a step to this place, so far along the way.
+    /// Adds a step to this place, at this distance from the start.
     pub(super) fn add(&mut self, place: [f64; 3], distance: f64) {
         self.steps += 1;
         if self.steps.is_multiple_of(self.every) {
@@ -64,14 +65,14 @@ impl Track {
         self.reach(place, distance);
     }
 
-    /// Notes that it was stopped at this place, so far along the way.
+    /// Records a stop at this place, at this distance from the start.
     pub(super) fn stop(&mut self, place: [f64; 3], distance: f64) {
         if self.stops.len() < MOST_STOPS && self.stops.last() != Some(&(place, distance)) {
             self.stops.push((place, distance));
         }
     }
 
-    /// Ends the way at this place, which is not left out.
+    /// Ends the track at this place, which is always kept.
     pub(super) fn end(&mut self, place: [f64; 3], distance: f64) {
         if !self.steps.is_multiple_of(self.every) {
             self.put(place, distance);
@@ -88,7 +89,7 @@ impl Track {
         }
     }
 
-    /// Notes the points of the route that are reached here.
+    /// Records the points of the route that are reached here.
     fn reach(&mut self, [x, y, z]: [f64; 3], distance: f64) {
         while self.targets.get(self.reached.len()) == Some(&[x, y]) {
             self.reached.push([distance, z]);
@@ -96,7 +97,7 @@ impl Track {
     }
 }
 
-/// Leaves out every second one.
+/// Removes every second item.
 fn halve<T>(items: &mut Vec<T>) {
     let mut is_kept = false;
     items.retain(|_| {

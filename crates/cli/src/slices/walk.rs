@@ -1,4 +1,4 @@
-//! `slices walk`: an avatar along a route.
+//! `slices walk`: walks an avatar along a route.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -26,54 +26,60 @@ use crate::{output, picture};
 pub struct WalkArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// The route: `{"start":[x,y,z],"points":[[x,y],…]}`, the points by the two coordinates across the axis
-    /// that points up
+    /// Route, as `{"start":[x,y,z],"points":[[x,y],…]}`
+    ///
+    /// The points are the two coordinates across the axis that points up.
     #[arg(long, value_name = "FILE.json")]
     pub route: PathBuf,
     /// Width, depth and height of the avatar
     #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.6", value_parser = parse_avatar)]
     pub avatar: AvatarBox,
-    /// How far it climbs at once, and falls in a step
+    /// Height that the avatar climbs at once, and falls in a step
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
     pub climb: f64,
-    /// Length of a step, at most the lesser side of the avatar's base, so that it steps over nothing; by
-    /// default a pixel's side
+    /// Length of a step; by default a pixel's side
+    ///
+    /// The lesser side of the avatar's base limits it, so that the avatar steps over nothing.
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
     pub step: Option<f64>,
-    /// What it does where something is in the way
+    /// Response to something in the way
     #[arg(long, value_enum, default_value_t = ResponseName::Back)]
     pub response: ResponseName,
-    /// Slices kept in memory, by default 16; raised to what the avatar spans
+    /// Slices kept in memory; by default 16
+    ///
+    /// It is raised to the number that the avatar spans.
     #[arg(long, value_name = "N")]
     pub cache: Option<u32>,
     /// Load slices only when they are needed
     #[arg(long)]
     pub no_prefetch: bool,
-    /// Picture, as PNG: the storeys from above with the route, and height over distance
+    /// Draw the storeys from above with the route, and height over distance, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
-    /// A line a step: distance,x,y,z,blocked,falling
+    /// Write each step, one line distance,x,y,z,blocked,falling each
     #[arg(long, value_name = "OUT.csv")]
     pub trace: Option<PathBuf>,
-    /// One object of JSON a step instead of sentences; all of it is the same again but for stalls, which
-    /// depend on how fast slices are loaded ahead: with --no-prefetch they do not
+    /// Print one JSON object a step
+    ///
+    /// The output is reproducible except for the stalls, which depend on the speed of loading
+    /// ahead. With --no-prefetch they are reproducible too.
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// A response, by name.
+/// The names of the responses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ResponseName {
-    /// Back to the last valid place, as in the paper
+    /// Stay at the last valid place, as in Anjos et al. 2012
     Back,
-    /// Along the wall
+    /// Slide along the wall
     Slide,
 }
 
-/// A line of the output.
+/// A line of the JSON output.
 #[derive(Debug, Serialize)]
 struct StepLine {
     position: [f64; 3],
@@ -115,7 +121,7 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
     }
     let walker = match route.stand(&mut cache, &avatar) {
         Ok(walker) if !walker.is_falling() => walker,
-        // The nearest place may need any slice.
+        // The search for the nearest place may need any slice.
         Ok(_) | Err(StoreError::Walk(WalkError::Blocked { .. })) => {
             let (map, faults) = folder.load_all();
             faults.iter().for_each(console::warn);
@@ -150,12 +156,12 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// What a walk comes to, step by step.
+/// Totals of a walk.
 struct Tally {
     up: Up,
-    /// Where the feet are, in the caller's coordinates.
+    /// The place of the feet, in the caller's coordinates.
     position: [f64; 3],
-    /// Along the ground.
+    /// Horizontal distance from the start.
     distance: f64,
     steps: u64,
     blocked: u64,
@@ -167,7 +173,7 @@ impl Tally {
         Self { up, position: start, distance: 0.0, steps: 0, blocked: 0, falling: 0 }
     }
 
-    /// Where the feet are, in the map's coordinates.
+    /// Returns the place of the feet, in the map's coordinates.
     fn place(&self) -> [f64; 3] {
         self.up.to_map(self.position)
     }
@@ -183,8 +189,8 @@ impl Tally {
     }
 }
 
-/// Walks on, and tells every step at once: as JSON and in the trace, if asked for. Of the steps themselves
-/// only what a picture needs is kept.
+/// Walks on and writes every step at once, as JSON and into the trace, if wanted. Keeps only the
+/// steps that a picture needs.
 fn walk(
     args: &WalkArgs,
     route: &Route,
@@ -206,7 +212,7 @@ fn walk(
             tally.add(step);
             if let Some(track) = &mut track {
                 track.add(tally.place(), tally.distance);
-                // Where it slides along something it is not stopped.
+                // Sliding along something is no stop.
                 if step.blocked && tally.position == before {
                     track.stop(tally.place(), tally.distance);
                 }
@@ -236,7 +242,7 @@ fn walk(
     Ok((ended, tally, track))
 }
 
-/// Refuses to write over what is read, or twice to one file.
+/// Fails if an output would overwrite an input, or two outputs name one file.
 fn check_outputs(args: &WalkArgs) -> Result<(), CliError> {
     let mut inputs = vec![args.route.clone()];
     inputs.extend(std::fs::read_dir(&args.folder).into_iter().flatten().flatten().map(|file| file.path()));
@@ -247,7 +253,7 @@ fn check_outputs(args: &WalkArgs) -> Result<(), CliError> {
     if let (Some(image), Some(trace)) = (&args.image, &args.trace)
         && output::is_same(image, trace)
     {
-        return Err(CliError::Usage("--image and --trace name the same file; name two".into()));
+        return Err(CliError::Usage("expected two files for --image and --trace, got the same file".into()));
     }
     if let Some(path) = &args.image {
         picture::check_name(path)?;
@@ -255,7 +261,7 @@ fn check_outputs(args: &WalkArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Why there is no walk: the route, an option, or the map.
+/// Returns the error of a walk: of the route, an option, or the map.
 fn refused(args: &WalkArgs, cause: StoreError) -> CliError {
     match cause {
         StoreError::Walk(cause @ (WalkError::NotFinite { .. } | WalkError::FarOff { .. })) => {
@@ -276,7 +282,7 @@ fn read_route(args: &WalkArgs) -> Result<Route, CliError> {
     Ok(route)
 }
 
-/// For people.
+/// Formats the end of a walk as text.
 fn sentence(ended: Ended, route: &Route, tally: &Tally) -> String {
     let end = tally.position.map(short).join(", ");
     let far = short(tally.distance);

@@ -1,4 +1,5 @@
-//! A walk from above, storey by storey where it comes over itself, and its height over its length.
+//! The picture of a walk: from above, in several views where it crosses above itself, and its
+//! height over its length.
 
 use nearmiss::slices::{Avatar, AvatarOptions, SliceMap, Storey};
 
@@ -19,17 +20,17 @@ const GROUND: Colour = [255, 255, 255];
 const WAY: Colour = [208, 60, 40];
 const ELSEWHERE: Colour = [226, 166, 158];
 
-/// Where there are several, a view holds so many times the avatar's height, unless there would be
-/// more than `MOST_VIEWS`.
+/// Height of one of several views, as a multiple of the avatar's height, unless there would be more
+/// than `MOST_VIEWS`.
 const STOREY: f64 = 2.0;
 const MOST_VIEWS: f64 = 9.0;
 
-/// Places of the way that are held against each other.
+/// Greatest number of places that are compared with each other.
 const MOST_PLACES: usize = 1500;
 
-/// A view for each storey that the walk was on, lowest first; below them its height over its
-/// length. Pixels are shown as they are to the avatar where it came nearest to them. `floors` are
-/// the storeys of the map, as far as they are known.
+/// Draws a view for each storey of the walk, lowest first, and below them its height over its
+/// length. Pixels are coloured by their kind for the avatar where it came nearest to them. `floors`
+/// are the known storeys of the map.
 pub(super) fn paint(map: &SliceMap, track: &Track, avatar: &Avatar, floors: &[Storey]) -> Picture {
     let options = avatar.options();
     let storeys = storeys(track, options, floors);
@@ -86,9 +87,9 @@ fn paint_storey(canvas: &mut Canvas, view: &View<'_>, track: &Track, heights: [f
     }
 }
 
-/// Ranges of height that hold all places, none empty: a single one, unless the walk comes over
-/// itself. Then those of the storeys of the map that it was on, or equal ones if it was on one
-/// alone.
+/// Returns ranges of height that contain all places, none empty: a single one unless the walk
+/// crosses above itself. Otherwise they are those of the storeys of the map that the walk was on,
+/// or equal ones if it was on one alone.
 fn storeys(track: &Track, avatar: &AvatarOptions, floors: &[Storey]) -> Vec<[f64; 2]> {
     let heights = || track.places.iter().map(|p| p[2]);
     let low = heights().fold(f64::INFINITY, f64::min);
@@ -109,7 +110,8 @@ fn storeys(track: &Track, avatar: &AvatarOptions, floors: &[Storey]) -> Vec<[f64
     all.filter(is_used).collect()
 }
 
-/// Whether at one place there was an avatar above the head of itself.
+/// Returns `true` if the avatar was at two heights of nearly the same place, one above its head at
+/// the other.
 fn is_over_itself(track: &Track, avatar: &AvatarOptions) -> bool {
     let places: Vec<&[f64; 3]> =
         track.places.iter().step_by(track.places.len().div_ceil(MOST_PLACES)).collect();
@@ -121,12 +123,12 @@ fn is_over_itself(track: &Track, avatar: &AvatarOptions) -> bool {
 }
 
 fn is_within(z: f64, [low, high]: [f64; 2]) -> bool {
-    // Whatever rounding says of the lowest and the highest.
+    // The tolerance keeps the lowest and the highest place within in spite of rounding.
     let off = 1e-9 * (1.0 + low.abs().max(high.abs()));
     low - off <= z && z <= high + off
 }
 
-/// Height over distance.
+/// Draws the height over the distance.
 fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track, avatar: &AvatarOptions) {
     let margin = 64 * FINE;
     let area = Area {
@@ -137,11 +139,11 @@ fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track, avatar: &Av
     };
     canvas.text([outer.left, outer.top + 4 * FINE], LETTER, INK, "height over the way");
     canvas.fill(area, EMPTY);
-    // A walk of no length, or of a step, is shown as a short one.
+    // A very short walk gets a scale of at least the avatar's width.
     let length = track.distances.last().copied().unwrap_or(0.0).max(avatar.base[0].max(avatar.base[1]));
     let ends = track.places.iter().map(|p| p[2]);
     let [least, most] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], z| [l.min(z), h.max(z)]);
-    // The unevenness of a level way is not spread over the whole height.
+    // The unevenness of a level walk is not spread over the whole height.
     let rise = (most - least).max(0.02 * length).max(avatar.height);
     let low = least - 0.5 * (rise - (most - least));
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
@@ -184,7 +186,7 @@ fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track, avatar: &Av
     }
 }
 
-/// Round numbers in a range, at most about so many.
+/// Returns round numbers in a range, about `most` of them at most.
 fn ticks([low, high]: [f64; 2], most: f64) -> impl Iterator<Item = f64> {
     let least = (high - low) / most;
     let power = 10.0_f64.powf(least.log10().floor());
@@ -197,7 +199,7 @@ fn ticks([low, high]: [f64; 2], most: f64) -> impl Iterator<Item = f64> {
         .map(move |i| (first + i) * step)
 }
 
-/// What colours mean.
+/// Returns the entries of the legend.
 fn entries(several: bool, stopped: bool) -> Vec<(Colour, &'static str)> {
     let mut entries = vec![
         (FLOOR, "floor"),
@@ -225,7 +227,7 @@ mod tests {
 
     const GRID: Grid = Grid { up: Up::Z, origin: [0.0; 3], pixel: 1.0, slice_height: 1.0, counts: [1; 3] };
 
-    /// A way through these places, a unit of length a step.
+    /// Creates a track through these places, one unit of length a step.
     fn track(places: &[[f64; 3]], points: &[[f64; 2]], grid: &Grid) -> Track {
         let route = Route { start: places[0], points: points.to_vec() };
         let mut track = Track::new(&route, grid, places[0]);
@@ -295,13 +297,13 @@ mod tests {
             picture.pixels().chunks(3).filter(|pixel| *pixel == colour).count()
         };
         let way: Vec<[f64; 3]> = (0..20_u8).map(|i| [0.5 + 0.05 * f64::from(i), 2.0, 0.0]).collect();
-        // Legends hold a patch of either colour.
+        // The legend has a patch of either colour.
         let plain = shown(&way, &[], false);
         let stopped = shown(&way, &[], true);
         assert_eq!(count(&plain, STOP), 0);
         assert!(count(&stopped, STOP) > 14 * 12 + 20, "{} pixels of crosses", count(&stopped, STOP));
-        // Of the view of a far point to the right or left, that half of the picture, without the
-        // legend, holds the ring alone: the way is a few pixels at the other end.
+        // The half of the picture on the side of a far point, without the legend, contains the ring
+        // alone: the walk is a few pixels at the other end.
         for (far, is_right) in [([30.0, 2.0], true), ([-30.0, 2.0], false)] {
             let picture = shown(&way, &[far], false);
             let (width, height) = picture.size();

@@ -130,7 +130,7 @@ fn pictures_are_taken_from_where_it_is_said() {
             place.refused(2, &[command, options].concat(), &[told]);
         }
     };
-    refused(&["--image", "d.png", "--up", "w"], "known are x, y, z, -x, -y and -z");
+    refused(&["--image", "d.png", "--up", "w"], "expected x, y, z, -x, -y or -z, got `w`");
     refused(&["--image", "d.png", "--view", "30"], "such as 30,20");
     refused(&["--image", "d.png", "--view", "30,95"], "the elevation from -90 to 90");
     refused(&["--up", "z"], "--image");

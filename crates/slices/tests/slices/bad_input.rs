@@ -1,4 +1,4 @@
-//! What no map can be made of is refused before anything is allocated.
+//! Invalid options and points are rejected before anything is allocated.
 
 use nearmiss_geometry::{Aabb, TriangleMesh};
 use nearmiss_slices::{Floor, Obstacle, Pixel, SliceBuilder, SliceError, SliceOptions, SlicePlan, Up};
@@ -30,21 +30,21 @@ fn refusals_say_what_would_mend_it() {
         (plan(&side(0.05), [1e30, 1.0, 3.0]), "to [1e30, 3.0, 6.0]"),
         (plan(&side(0.05), [1.0, 1.0, 1e30]), "7e30 slices of 21 × 21"),
         (plan(&side(0.05), [1.0, 1.0, 1e30]), "to [2.0, 3.0, 1e30]"),
-        (plan(&side(1e308), room), "a pixel of side 1e308"),
-        (plan(&side(0.05).with_memory(0), room), "0 are allowed"),
-        (plan(&side(1.0).with_slice_height(Some(-1e-300)), room), "height -1e-300"),
-        (plan(&side(1.0).with_slice_height(Some(1e-300)), room), "span 1.0e300 of"),
+        (plan(&side(1e308), room), "finite, got 1e308"),
+        (plan(&side(0.05).with_memory(0), room), "at most 0 MiB"),
+        (plan(&side(1.0).with_slice_height(Some(-1e-300)), room), "height above 0, got -1e-300"),
+        (plan(&side(1.0).with_slice_height(Some(1e-300)), room), "below 1, got 1.0e300"),
         (plan(&side(1.0).with_memory(9), [1.0; 3]), "take 1 MiB"),
-        (plan(&side(0.0), room), "a length above 0"),
-        (plan(&side(f64::NAN), room), "a length above 0"),
+        (plan(&side(0.0), room), "a pixel side above 0"),
+        (plan(&side(f64::NAN), room), "a pixel side above 0"),
         (plan(&options.with_pixel(Pixel::Count(0)), room), "at least 1"),
-        (plan(&options.with_slice_height(Some(-1.0)), room), "a length above 0"),
+        (plan(&options.with_slice_height(Some(-1.0)), room), "a finite slice height above 0"),
         (plan(&side(1e-5), room), "2^31"),
         (plan(&side(1e-300), room), "2^31"),
         (plan(&side(0.001), room), "MiB"),
         (plan(&options.with_pixel(Pixel::Count(100_000)), [1.0, 1e-3, 1e6]), "MiB"),
-        (plan(&options.with_memory(1 << 20), room), "1 are allowed"),
-        // Thin slices of few pixels, each of which takes little but for its being there.
+        (plan(&options.with_memory(1 << 20), room), "at most 1 MiB"),
+        // Thin slices of few pixels, whose cost is mostly overhead.
         (plan(&thin, [1e-9, 1e-9, 2.0]), "200000001 slices of 1 × 1 pixels"),
         (plan(&thin, [1e-9, 1e-9, 2.0]), "higher slices"),
         (plan(&thin.with_memory(u64::MAX).with_slice_height(Some(1e-10)), room), "higher slices"),
@@ -173,7 +173,7 @@ fn triangles_without_area_still_fill_their_pixels() {
     for i in 0..=1000_u16 {
         let s = f64::from(i) / 1000.0;
         let p = [1.0 + 2.0 * s, 2.0 + s, 3.0 + 3.0 * s];
-        // Off the walls of the lattice.
+        // Tolerates points on the borders of voxels.
         let near = Aabb { min: p.map(|x| x - 1e-6), max: p.map(|x| x + 1e-6) };
         assert!(map.touches(&near).unwrap(), "{p:?}");
     }

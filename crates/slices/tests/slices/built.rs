@@ -5,7 +5,7 @@ use nearmiss_slices::{SliceBuilder, SliceError, SliceMap, SliceOptions, SlicePla
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use nearmiss_testdata::house::{Quad, triangles};
 
-/// The map of these points.
+/// Returns the map of these points.
 pub(crate) fn built(points: &[[f64; 3]], options: &SliceOptions) -> Result<SliceMap, SliceError> {
     let plan = SlicePlan::new(options, &Aabb::of(points.iter().copied()))?;
     let mut builder = SliceBuilder::new(&plan)?;
@@ -19,7 +19,7 @@ pub(crate) fn dragon() -> Vec<[f64; 3]> {
     dragon_mesh(Dragon::Points23k).unwrap().vertices().to_vec()
 }
 
-/// The map of surfaces, sampled for it.
+/// Returns the map of sampled surfaces.
 pub(crate) fn of_quads(quads: &[Quad], options: &SliceOptions) -> SliceMap {
     let mesh = triangles(quads);
     let plan = SlicePlan::new(options, &Aabb::of(mesh.vertices().iter().copied())).unwrap();

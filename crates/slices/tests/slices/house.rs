@@ -1,4 +1,4 @@
-//! What is floor and what is obstacle in a generated house, scanned with noise or sampled from its triangles.
+//! Floors and obstacles of a generated house, scanned with noise or sampled from its triangles.
 
 use std::ops::RangeInclusive;
 
@@ -75,7 +75,7 @@ fn floors_have_the_heights_of_points_where_slices_join() {
     for (i, j) in (0..60).flat_map(|i| (0..60).map(move |j| (i, j))) {
         let [x, y] = [step(i), step(j)];
         points.push([x, y, 0.0]);
-        // In every pixel both heights; on some of the table only the lower.
+        // Both heights in every pixel; only the lower on a part of the table.
         points.extend(heights[..if i < 40 { 2 } else { 1 }].iter().map(|&z| [x, y, z]));
     }
     let map = built(&points, &options(0.05, Obstacle::Share(0.3))).unwrap();
@@ -101,7 +101,7 @@ fn floors_have_the_heights_of_points_where_slices_join() {
             assert!((found - expected).abs() <= level, "{found} at {x} below {base}, expected {expected}");
         }
     }
-    // Wherever a box stands, the floor below it is a point's.
+    // The floor below every box is the height of a point.
     let mut seen = 0;
     for i in 0..1000_u16 {
         let [x, base] = [f64::from(i % 25) * 0.04 + 0.1, f64::from(i / 25) * 0.01];
@@ -113,7 +113,8 @@ fn floors_have_the_heights_of_points_where_slices_join() {
     assert!(seen > 200, "{seen} times on the table");
 }
 
-/// Of the columns of the map the share that has an obstacle in these rows, in the slice at a height.
+/// Returns the share of the map's columns that have an obstacle in these rows, in the slice at a
+/// height.
 fn obstacle_columns(map: &SliceMap, y: RangeInclusive<f64>, z: f64) -> f64 {
     let grid = map.grid();
     let slice = map.slice(*grid.range(2, [z, z]).unwrap().start()).unwrap();
@@ -148,7 +149,7 @@ fn no_pixel_of_a_meshs_surface_stays_empty() {
     assert_eq!(empty, 0, "places of the surface in empty pixels");
 }
 
-/// How far the pixels of a round column reach beyond it: less than their diagonal.
+/// The pixels of a round column reach beyond it by less than their diagonal.
 #[test]
 fn columns_are_as_round_as_pixels_allow() {
     let pixel = 0.04;
@@ -163,7 +164,7 @@ fn columns_are_as_round_as_pixels_allow() {
                 let away = (px - x).hypot(py - y);
                 if let Some(content) = slice.pixel(column, row).filter(|_| away < 2.0 * COLUMN) {
                     inside += 1;
-                    // But for pixels that the column only grazes.
+                    // Except for pixels that the column only grazes.
                     obstacles += usize::from(content.is_obstacle);
                     farthest = farthest.max((away - COLUMN).abs());
                 }

@@ -1,4 +1,4 @@
-//! A map against a map, posed about the axis that points up.
+//! Collision of two maps, posed about the axis that points up.
 
 use nearmiss_geometry::Pose;
 use nearmiss_slices::{Floor, ObjectError, Occupancy, Pixel, SliceMap, SliceOptions, Up};
@@ -13,7 +13,7 @@ fn house_map() -> SliceMap {
     built(&scanned(&house(), 0.04, 0.0, 1), &options).unwrap()
 }
 
-/// A crate half a metre wide, from its own zero upwards; only its corners and some points on its sides.
+/// A crate half a metre wide, with its base at 0; only corners and some points on its sides.
 fn crate_points() -> Vec<[f64; 3]> {
     let rng = &mut rng(4);
     let mut points = vec![[-0.25, -0.25, 0.0], [0.25, 0.25, 0.5]];
@@ -26,8 +26,8 @@ fn crate_points() -> Vec<[f64; 3]> {
     points
 }
 
-/// Every pixel of the object against every pixel of the building: squares, one of them turned, by the four
-/// axes of their sides.
+/// Compares every pixel of the object with every pixel of the building: separating axes of two
+/// squares, one of them rotated.
 fn by_the_formulas(building: &SliceMap, object: &SliceMap, pose: &Pose) -> [u64; 2] {
     let (grid, own) = (building.grid(), object.grid());
     let place = |[x, y]: [f64; 2], z: f64| grid.up.to_map(pose.apply(own.up.from_map([x, y, z])));
@@ -118,7 +118,8 @@ fn axes_may_differ_but_not_tilt() {
     let upright = built(&crate_points(), &SliceOptions::default().with_pixel(Pixel::Side(0.06))).unwrap();
     let lying: Vec<[f64; 3]> = crate_points().iter().map(|p| Up::Y.from_map(*p)).collect();
     let lying = built(&lying, &SliceOptions::default().with_pixel(Pixel::Side(0.06)).with_up(Up::Y)).unwrap();
-    // Of the crate that lies, y points up: turned about x it stands, and about z by what that leaves.
+    // In the lying crate y points up. The pose rotates it about x to make it stand, then about z to
+    // align it.
     let place = [9.0, 6.2, 0.05];
     let stand = Pose::from_quaternion([0.5, 0.5, 0.5, 0.5]).with_translation(place);
     let expected = building.meets(&upright, &Pose::from_translation(place), Floor::Mean).unwrap();

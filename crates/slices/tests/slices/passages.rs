@@ -1,4 +1,4 @@
-//! Who passes where in the generated house, scanned with more and with less noise.
+//! Passages of the generated house, scanned with different noise, by avatars of different sizes.
 
 use std::ops::RangeInclusive;
 
@@ -10,7 +10,7 @@ use nearmiss_testdata::house::{COLUMN, COLUMNS, DOOR, GAP, LOW, STAIRS, STOREY, 
 
 use crate::built::built;
 
-/// Standard deviations along the normal, and how far apart points are.
+/// Standard deviation of the noise along the normal, and spacing of the points.
 const NOISE: [[f64; 2]; 4] = [[0.0, 0.02], [0.003, 0.02], [0.006, 0.02], [0.012, 0.025]];
 
 fn map_of([noise, spacing]: [f64; 2], pixel: f64) -> SliceMap {
@@ -18,13 +18,13 @@ fn map_of([noise, spacing]: [f64; 2], pixel: f64) -> SliceMap {
     built(&points, &SliceOptions::default().with_pixel(Pixel::Side(pixel))).unwrap()
 }
 
-/// Somebody so wide and high.
+/// An avatar of this width and height.
 fn avatar(map: &SliceMap, [width, height]: [f64; 2]) -> Avatar {
     let options = AvatarOptions::default().with_box([width; 2], height).with_step(map.grid().pixel);
     Avatar::new(&options).unwrap()
 }
 
-/// A walk by somebody so wide and high.
+/// Walks an avatar of this width and height.
 fn walk(map: &SliceMap, body: [f64; 2], way: &[[f64; 3]], response: &dyn Response) -> (Ended, Vec<Step>) {
     let route = Route { start: way[0], points: way[1..].iter().map(|p| [p[0], p[1]]).collect() };
     let mut steps = Vec::new();
@@ -35,7 +35,7 @@ fn walk(map: &SliceMap, body: [f64; 2], way: &[[f64; 3]], response: &dyn Respons
     (ended.unwrap(), steps)
 }
 
-/// Straight ahead at this height of the feet, without sliding.
+/// Returns `true` if the avatar passes straight ahead on the lower floor, without sliding.
 fn passes(map: &SliceMap, body: [f64; 2], from: [f64; 2], to: [f64; 2]) -> bool {
     let (ended, steps) = walk(map, body, &[[from[0], from[1], 0.05], [to[0], to[1], 0.0]], &Back);
     assert!(steps.iter().all(|step| !step.falling && step.position[2] < 0.36), "on the lower floor");
@@ -50,7 +50,7 @@ fn doors_are_passed_by_whoever_is_narrower() {
             for [low, high] in [[DOOR[0], DOOR[1]], GAP] {
                 let middle = 0.5 * (low + high);
                 let passing = |width: f64| passes(&map, [width, 1.6], [7.6, middle], [10.4, middle]);
-                // Pixels that a side of the door reaches into, and their noise.
+                // The pixels that a side of the door covers in part, and their noise.
                 let lost = 2.0 * (pixel + 3.0 * noise[0]);
                 let told = format!("noise {noise:?}, pixels of {pixel}, {:.1} wide", high - low);
                 for width in [0.3, 0.6, 0.9].map(|share| share * (high - low - lost)) {
@@ -60,7 +60,7 @@ fn doors_are_passed_by_whoever_is_narrower() {
                     assert!(!passing(width), "{told}: {width} passes");
                 }
             }
-            // As high as the lintel lets it.
+            // As high as the lintel permits.
             let middle = 0.5 * (DOOR[0] + DOOR[1]);
             let passing = |height| passes(&map, [0.4, height], [7.6, middle], [10.4, middle]);
             let fits = DOOR[2] - pixel - 6.0 * noise[0] - 0.02;
@@ -99,12 +99,13 @@ fn columns_are_gone_round_by_sliding() {
                     let (ended, steps) = walk(&map, [0.3, 1.6], &[at(-0.72, 0.02), at(0.72, 0.0)], &Back);
                     assert_eq!(ended, Ended::Stuck { point: 0 }, "{told}");
                     let stop = steps.last().unwrap().position;
-                    // From the box, and not more than what a step and the diagonal of a pixel add.
+                    // The distance from the box: at most what a step and the diagonal of a pixel
+                    // add.
                     let away = [stop[0] - x, stop[1] - y].map(|d| (d.abs() - 0.15).max(0.0));
                     let gap = away[0].hypot(away[1]) - COLUMN;
                     let most = 2.5 * pixel + 4.0 * noise[0];
                     assert!((-0.01..most).contains(&gap), "{told}: {gap} before the column");
-                    // Past its side, the straight way cut short.
+                    // Past the side of the column, after a straight approach.
                     let round = [at(-0.72, 0.02), at(0.3, 0.56), at(0.72, 0.0)];
                     let (ended, _) = walk(&map, [0.3, 1.6], &round, &Back);
                     assert_eq!(ended, Ended::Stuck { point: 0 }, "{told}");
@@ -160,7 +161,7 @@ fn high_slices_let_pass_under_a_ceiling_that_low_ones_do() {
             let (ended, steps) = walk(&map, [0.4, height], &[[0.6, 1.5, 1.35], [2.4, 1.5, 0.0]], &Back);
             let room = ceiling - 1.3 - height;
             let told = format!("ceiling at {ceiling}, {height} high: {ended:?} at {:?}", steps.last());
-            // Heights are known up to a level of 255; of a ceiling only one of 16 is.
+            // Heights are exact to a level of 255, those of ceilings to 16 levels.
             let level = 1.5 / 255.0;
             if room > 17.0 * level {
                 assert_eq!(ended, Ended::Arrived, "{told}");

@@ -1,4 +1,4 @@
-//! Ramps are floor or obstacle, and are climbed or not, as the angle asked for says.
+//! Ramps are floor or obstacle, and are climbed or not, depending on the given angle.
 
 use nearmiss_slices::{
     Avatar, AvatarOptions, Back, Obstacle, Pixel, Route, SliceMap, SliceOptions, WalkError,
@@ -10,12 +10,12 @@ use crate::built::{built, of_quads};
 /// Breadth of a ramp, and its length on the ground.
 const SIZE: [f64; 2] = [2.0, 3.0];
 
-/// What is nearer to the edge of a ramp does not count.
+/// Margin at the edge of a ramp that does not count.
 const EDGE: f64 = 0.25;
 
 /// A ramp in a plane, with the ground before it.
 struct Ramp {
-    /// Up it, on the ground.
+    /// Horizontal direction upwards.
     along: [f64; 2],
     quads: Vec<Quad>,
 }
@@ -29,7 +29,7 @@ impl Ramp {
         let corner = [0.5 * breadth * s, -0.5 * breadth * c, 0.0];
         let up = [length * c, length * s, length * angle.to_radians().tan()];
         let before = [-2.0 * c, -2.0 * s, 0.0];
-        // Something below, so that slices begin at no particular height of it.
+        // A patch below, so that the slices begin at an arbitrary height of the ramp.
         let below = Quad { corner: [0.0, 0.0, -0.41], sides: [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0]] };
         let quads = [up, before].map(|side| Quad { corner, sides: [across, side] });
         Self { along: [c, s], quads: [&quads[..], &[below]].concat() }
@@ -102,7 +102,8 @@ fn noise_lets_ramps_switch_later_by_no_more_than_itself() {
             // Noise a tenth of a pixel is too much for a slope of 60°: some more of its pixels are obstacles.
             let (after, estimated) = share(angle + 2.0);
             assert!(after < most, "{angle}°, noise {noise}: {after} are obstacles for {}°", angle + 2.0);
-            // Where the slope spans what is allowed without any noise. A gentle one drowns in it.
+            // Below this angle the slope and the noise together span less than is allowed. A gentle
+            // slope is lost in noise.
             let least = (angle.to_radians().tan() - estimated / PIXEL).atan().to_degrees() - 1.0;
             if least > 1.0 {
                 steep += 1;
@@ -114,7 +115,7 @@ fn noise_lets_ramps_switch_later_by_no_more_than_itself() {
     assert_eq!(steep, 7, "ramps that stand out");
 }
 
-/// How high one comes who walks straight up.
+/// Returns the height that an avatar reaches when it walks straight up.
 fn reached(map: &SliceMap, from: [f64; 2], to: [f64; 2], pixel: f64) -> f64 {
     let avatar = Avatar::new(&AvatarOptions::default().with_step(pixel)).unwrap();
     let mut highest = f64::NEG_INFINITY;

@@ -1,4 +1,4 @@
-//! Places to stand, reach and routes, against naive twins that know nothing but [`Walker`].
+//! Places to stand, reach and routes, compared with naive twins that use only [`Walker`].
 
 use std::collections::BTreeMap;
 
@@ -71,7 +71,7 @@ fn naive_straight(map: &SliceMap, mut walker: Walker, to: [f64; 2], falls: bool)
     Some(walker)
 }
 
-/// States of the walker by column and row, with how far each is from the start.
+/// States of the walker by column and row, each with its distance from the start.
 struct Naive<'a> {
     map: &'a SliceMap,
     lattice: StepGrid,
@@ -92,7 +92,7 @@ impl<'a> Naive<'a> {
         [0, 1].map(|k| ((p[k] - self.lattice.origin[k]) / self.lattice.spacing).floor() as i64)
     }
 
-    /// Goes over all edges until nothing gets shorter: Bellman and Ford.
+    /// Relaxes all edges until no path gets shorter (Bellman–Ford).
     fn new(map: &'a SliceMap, start: &Walker, lattice: StepGrid, falls: bool) -> Self {
         let mut naive = Self { map, lattice, falls, found: BTreeMap::new() };
         let from = map.grid().up.to_map(start.position(map.grid()));
@@ -140,7 +140,7 @@ impl<'a> Naive<'a> {
         places
     }
 
-    /// Length of the shortest path to a place where somebody stands.
+    /// Returns the length of the shortest path to a place where an avatar stands.
     fn length_to(&self, start: &Walker, goal: &Walker) -> Option<f64> {
         let grid = self.map.grid();
         let [from, to] = [start, goal].map(|walker| grid.up.to_map(walker.position(grid)));
@@ -158,7 +158,7 @@ impl<'a> Naive<'a> {
     }
 }
 
-/// Places where somebody stands.
+/// Random places where the avatar stands.
 fn standing(map: &SliceMap, seed: u64, count: usize) -> Vec<([f64; 3], Walker)> {
     let rng = &mut rng(seed);
     let mut found = Vec::new();
@@ -263,7 +263,7 @@ fn walked(map: &SliceMap, route: &Route, falls: bool, told: &str) -> [f64; 3] {
     end
 }
 
-/// Looks at every height of every place.
+/// Searches every height of every place.
 fn nearest_naive(map: &SliceMap, near: [f64; 3]) -> Option<f64> {
     let grid = map.grid();
     let lattice = StepGrid::new(grid, &avatar(), grid.pixel);
@@ -322,7 +322,7 @@ fn starts_that_do_not_serve_name_the_nearest_place() {
         }
     }
     assert!(causes.len() == 4 && causes.values().all(|count| *count > 1), "{causes:?}");
-    // Somebody too large for the map.
+    // An avatar too large for the map.
     let giant = Avatar::new(&AvatarOptions::default().with_box([0.3; 2], 1.0).with_climb(0.05)).unwrap();
     let map = built(
         &[[0.0; 3], [0.0, 0.0, 0.3], [0.0, 0.0, 0.6], [1.0, 1.0, 0.9], [1.0, 1.0, 0.2]],

@@ -1,5 +1,5 @@
-//! Walks through buildings that are no part of the repository, where the environment names a folder that has
-//! them.
+//! Walks through scanned buildings outside the repository, in the folder that an environment
+//! variable names.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use nearmiss_testdata::arbitrary::rng;
 use nearmiss_testdata::scenes::{DUNGEON, GALLERY, NAV_TEST, SPONZA, Scene, TWO_STOREYS};
 use rand::RngExt;
 
-/// A scene as it was read, with points on its surface by metres across.
+/// A scene as read, with points on its surface by square metre.
 struct Read {
     scene: Scene,
     model: nearmiss_io::Model,
@@ -21,7 +21,7 @@ struct Read {
 }
 
 impl Read {
-    /// None where the folder or the file is not there; then that is said.
+    /// Reads the scene. Returns `None`, with a note, if the folder or the file is missing.
     fn new(scene: &Scene) -> Option<Self> {
         let folder = std::env::var_os("NEARMISS_DATA").map(PathBuf::from);
         let Some(path) = folder.map(|folder| folder.join(scene.file)).filter(|path| path.is_file()) else {
@@ -63,13 +63,13 @@ impl Read {
         builder.finish()
     }
 
-    /// The walk, in the map's coordinates; checks of every step that the avatar is in nothing, by the map and
+    /// Walks the route. Checks after every step that the avatar is inside nothing, by the map and
     /// by the points.
     fn walk(&self, pixel: Pixel, route: &Route, response: &dyn Response) -> Walked {
         self.walk_as(&AvatarOptions::default(), &self.map(pixel), route, response)
     }
 
-    /// The same by somebody of this size.
+    /// The same for an avatar of this size.
     fn walk_as(
         &self,
         options: &AvatarOptions,
@@ -136,7 +136,7 @@ impl Walked {
         self.heights.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Arrived here, and nothing was in the way.
+    /// Asserts that the walk arrived here without being blocked.
     fn assert_free(&self, end: [f64; 3], off: f64) {
         assert_eq!(self.ended, Ended::Arrived, "ended at {:?}", self.end);
         assert_eq!((self.blocked, self.falling), (0, 0), "blocked and falling");
@@ -149,7 +149,7 @@ fn metre(x: f64) -> i64 {
     x.floor() as i64
 }
 
-/// Points on a mesh, evenly by area: some four hundred a square metre.
+/// Samples points on a mesh evenly by area, some four hundred a square metre.
 fn samples(mesh: &TriangleMesh) -> Vec<[f64; 3]> {
     let rng = &mut rng(8);
     let mut points = Vec::new();
@@ -181,7 +181,7 @@ fn an_avatar_climbs_the_real_staircase_and_comes_down_again() {
     }
 }
 
-/// By the points alone, boxes so wide have room up to these heights (`anjos2012`, `headroom`).
+/// By the points alone, boxes of these widths fit up to these heights (`anjos2012`, `headroom`).
 #[test]
 fn who_is_too_high_is_stopped_under_the_ceiling_of_the_real_staircase() {
     let Some(read) = Read::new(&TWO_STOREYS) else { return };
@@ -200,8 +200,8 @@ fn who_is_too_high_is_stopped_under_the_ceiling_of_the_real_staircase() {
     }
 }
 
-/// Half the width of a level patch about a pixel, in pixels; how much it may rise or fall; and how much room
-/// is above a floor.
+/// Half the width of a level patch around a pixel, in pixels; its greatest rise; and the free
+/// height above a floor.
 const PATCH: i64 = 2;
 const LEVEL: f64 = 0.05;
 const ROOM: f64 = 1.0;
@@ -218,7 +218,7 @@ fn few_pixels_of_a_real_floor_are_taken_for_obstacles() {
     }
     let (mut floor, mut obstacles) = (0_u32, 0_u32);
     for ([column, row], own) in &heights {
-        // How far its own points spread says nothing of whether it is floor.
+        // The spread of its own points does not decide whether it is floor.
         let others = (-PATCH..=PATCH).flat_map(|dx| (-PATCH..=PATCH).map(move |dy| [dx, dy]));
         let others = others.filter(|at| *at != [0, 0]).map(|[dx, dy]| [column + dx, row + dy]);
         let others: Vec<&Vec<f64>> = others.filter_map(|at| heights.get(&at)).collect();
@@ -260,7 +260,7 @@ fn an_avatar_goes_around_the_gallery() {
     let Some(read) = Read::new(&GALLERY) else { return };
     let walked = read.walk(Pixel::Count(700), &read.route(), &Back);
     walked.assert_free([0.0, 4.82, 5.5], 0.05);
-    // Through the parapet nobody falls into the court.
+    // The parapet keeps the avatar from falling into the court.
     let aside = Route { points: vec![[0.0, 0.0]], ..read.route() };
     let walked = read.walk(Pixel::Count(700), &aside, &Back);
     assert_eq!(walked.ended, Ended::Stuck { point: 0 }, "ended at {:?}", walked.end);

@@ -1,4 +1,4 @@
-//! Maps in folders: whole, replaced, damaged, and loaded as they are needed.
+//! Maps in folders: complete, replaced, damaged, and loaded on demand.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ fn a_map_replaces_another_and_nothing_else() {
     let opened = SliceFolder::open(&folder).unwrap();
     assert_eq!(opened.load_all().0, second);
     assert_eq!(files(&folder).len(), opened.distinct() + 1, "{before} files before");
-    // What killed writers leave goes; what is somebody else's is not touched, whatever its name.
+    // Files of killed writers are removed; other files are not touched, whatever their names.
     let image = files(&folder)[0].clone();
     fs::copy(&image, folder.join("0123456789abcdef.nms")).unwrap();
     fs::write(folder.join("0123456789abcdee.nms.tmp-abcdefghijkl"), b"half").unwrap();
@@ -109,7 +109,7 @@ fn files_named_like_a_maps_are_not_taken_for_one() {
         assert!(matches!(map.save(&folder), Err(StoreError::Foreign { .. })), "{name} is a folder");
         assert_eq!(files(&folder).len(), 1);
     }
-    // A damaged index is one.
+    // A damaged index counts as a map.
     let folder = place.path().join("damaged");
     map.save(&folder).unwrap();
     fs::write(folder.join("index.nms"), b"").unwrap();
@@ -152,14 +152,15 @@ fn what_fails_leaves_nothing() {
     let (folder, other) = (place.path().join("map"), place.path().join("other"));
     first.save(&folder).unwrap();
     second.save(&other).unwrap();
-    // One of its slices cannot be written.
+    // A slice that cannot be written.
     let name = image(&other, 9);
     fs::create_dir(folder.join(name.file_name().unwrap())).unwrap();
     let before = files(&folder);
     assert!(matches!(second.save(&folder), Err(StoreError::Write(_))));
     assert_eq!(files(&folder), before);
     assert_eq!(SliceFolder::open(&folder).unwrap().load_all().0, first);
-    // Nor can a map of which a slice is missing; folders that were made for it go.
+    // A map without one of its slices cannot be written either; folders that were made for it are
+    // removed.
     fs::remove_file(image(&other, 9)).unwrap();
     let (missing, _) = SliceFolder::open(&other).unwrap().load_all();
     let deep = place.path().join("new/and/deep");
@@ -211,7 +212,7 @@ fn damage_is_named_and_the_others_serve() {
             .all(|(s, text)| text.starts_with(s)),
         "lowest first: {texts:?}"
     );
-    // A box above them is answered, one in them is not.
+    // A query of a box above the missing slices succeeds, one of a box in them fails.
     let grid = *opened.grid();
     let boxed = |slices: [u32; 2]| {
         let height = |s: u32| grid.origin[2] + (f64::from(s) + 0.5) * grid.slice_height;
@@ -251,7 +252,7 @@ fn up_and_over_the_edge() -> Route {
     Route { points: [&points[..], &[[8.0, Y]]].concat(), ..up_the_stairs() }
 }
 
-/// The map in a folder, and the steps of a walk through it with all in memory.
+/// Returns the map in a folder, and the steps of a walk with the whole map in memory.
 fn saved_and_walked(route: &Route, avatar: &Avatar) -> (tempfile::TempDir, SliceFolder, Vec<Step>) {
     let place = tempfile::tempdir().unwrap();
     let map = map();
@@ -307,7 +308,7 @@ fn a_cache_never_changes_a_walk_and_counts_the_same_every_time() {
         assert!(counts[0] > 50 * counts[1], "{counts:?}");
         misses.push(counts[1]);
     }
-    // Fewer slices are loaded twice, more ahead are missed less.
+    // A larger cache loads fewer slices twice; loading ahead reduces misses.
     assert!(misses[0] > misses[2] && misses[4] <= misses[1] && misses[5] < misses[2], "{misses:?}");
     let all = folder.grid().counts[2];
     assert!(misses[2] <= u64::from(all), "each once: {misses:?} of {all}");

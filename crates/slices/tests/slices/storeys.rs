@@ -43,13 +43,14 @@ fn tables_and_ceilings_are_no_storeys() {
     let one: Vec<[f64; 3]> = room(0.0).chain(table(0.0)).collect();
     let found = storeys(&one, Up::Z, 1.6);
     assert_eq!(found.len(), 1, "{found:?}");
-    // Walls, and under the table nobody stands: what is over it is within a storey of the floor.
+    // The floor under walls and table does not count; the table top is within a storey of the
+    // floor.
     assert!(found[0].height.abs() < 0.03 && (6.0..8.0).contains(&found[0].area), "{found:?}");
     let two: Vec<[f64; 3]> = room(0.0).chain(room(2.8)).chain(room(5.6)).collect();
     let heights: Vec<f64> = storeys(&two, Up::Z, 1.6).iter().map(|storey| storey.height).collect();
     let off = heights.iter().zip([0.0, 2.8, 5.6]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(heights.len() == 3 && off < 0.03, "{heights:?}");
-    // No room for anybody below the top, which is all there is left to stand on.
+    // No headroom below the top level, which is all that is left.
     let found = storeys(&one, Up::Z, 3.0);
     assert!(found.len() == 1 && (found[0].height - 2.5).abs() < 0.03, "{found:?}");
     // A lone level.

@@ -16,7 +16,7 @@ pub(crate) fn twin(map: &SliceMap, points: &[[f64; 3]]) -> SliceTwin {
     SliceTwin::new(&turned, grid.origin, [grid.pixel, grid.slice_height], map.about().share)
 }
 
-/// Compares all voxels; tells how many there are, and how many are obstacles.
+/// Compares all voxels; returns the number of voxels and of obstacles.
 fn compare(map: &SliceMap, points: &[[f64; 3]], what: &str) -> [u64; 2] {
     let twin = twin(map, points);
     let mut counts = [0; 2];
@@ -55,7 +55,7 @@ fn every_voxel_of_every_kind_of_cloud() {
     for kind in CloudKind::ALL {
         let points = cloud(kind, 3000, 5);
         for (rule, up) in RULES.into_iter().zip([Up::Z, Up::Y, Up::NegX, Up::NegZ]) {
-            // A cloud within one voxel of doubles has no extent to divide.
+            // A cloud within rounding of a point has no extent to divide.
             let Ok(map) = built(&points, &options(24, rule, up)) else { continue };
             let counts = compare(&map, &points, &format!("{kind:?}, {rule:?}, {up}"));
             compared += 1;
@@ -138,11 +138,11 @@ fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / count)
 }
 
-/// Mostly within the house, some on lines of the lattice, some beyond.
+/// Returns a random box: mostly within the house, some on lines of the lattice, some beyond.
 fn arbitrary_box(rng: &mut impl Rng, map: &SliceMap) -> Aabb {
     let grid = map.grid();
     let mut corner = [0, 1, 2].map(|k| rng.random_range([-1.0, -1.0, -1.0][k]..[17.0, 13.0, 6.5][k]));
-    // Some of more rows and columns than are looked at together.
+    // Some with more rows and columns than are searched together.
     let most = if rng.random_range(0..6_u8) == 0 { 16.0 } else { 1.2 };
     let size = [most, most, 1.2].map(|most: f64| rng.random_range(0.0..most));
     if rng.random_range(0..3_u8) == 0 {

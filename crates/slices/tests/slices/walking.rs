@@ -60,8 +60,8 @@ fn stairs_lead_up_and_down_again() {
         |i: u8| steps.iter().filter(|s| (s.position[2] - f64::from(i) * STOREY / 17.0).abs() < 0.02).count();
     assert!((1..17).all(|i| stood(i) >= 4), "{:?}", (1..17).map(stood).collect::<Vec<_>>());
 
-    // Never inside anything: no point of the scan between what can be climbed and the crown, well within the
-    // box.
+    // The avatar is never inside anything: no point of the scan is well within its box above the
+    // climb.
     let AvatarOptions { base, height, climb, .. } = *avatar().options();
     let mut near = 0;
     for step in &steps {
@@ -103,7 +103,7 @@ fn any_axis_may_point_up() {
 fn walls_gaps_and_low_ceilings_stop() {
     let map = map_of(&scan(), Up::Z);
     let half = 0.5 * avatar().options().base[0];
-    // Where the avatar's front ends, and where it was stopped.
+    // Start, target, and the coordinate that the avatar's front stops at.
     for (from, to, front) in [
         ([7.0, 6.5], [12.0, 6.5], 9.0),
         // The gap is 0.3 wide, the avatar 0.4.
@@ -116,7 +116,7 @@ fn walls_gaps_and_low_ceilings_stop() {
         assert_eq!(ended, Ended::Stuck { point: 0 }, "towards {to:?}");
         assert!(steps.last().unwrap().blocked, "towards {to:?}");
         let gap = front - (end(&steps)[0] + half);
-        // A step short, and what a pixel adds.
+        // At most a step short, plus a pixel.
         assert!((-0.02..PIXEL + 0.05 + 0.02).contains(&gap), "towards {to:?}: {gap} before {front}");
     }
 }
@@ -151,7 +151,7 @@ fn edges_are_fallen_off_onto_the_floor_below() {
     assert!(steps.len() < 10 && steps.iter().all(|step| step.falling), "{} steps", steps.len());
 }
 
-/// What stands on a line across: so high, of this thickness.
+/// A barrier across, of this thickness and height.
 fn barrier(x: f64, thick: f64, height: f64, depth: f64) -> Vec<[f64; 3]> {
     let heights = (0..).map(|i| 0.02 * f64::from(i)).take_while(|z| *z <= height);
     heights.flat_map(|z| level([x, 0.0], [x + thick, depth], z)).collect()
@@ -183,7 +183,7 @@ fn nothing_is_stepped_over_however_long_steps_are() {
             }
         }
     }
-    // Over a pit as wide as itself and a step nobody comes without falling.
+    // An avatar cannot cross a pit as wide as itself plus a step without falling.
     let pit = [level([0.0, 0.0], [4.0, 2.0], 1.0), level([4.9, 0.0], [8.0, 2.0], 1.0)].concat();
     let map = map_of(&[&pit[..], &level([0.0, 0.0], [8.0, 2.0], 0.0)].concat(), Up::Z);
     for step in [0.05, 0.3, 5.0] {
@@ -208,8 +208,8 @@ fn no_height_is_fallen_from_at_once() {
     points.push([0.0, 0.0, 2.0]);
     let map = map_of(&points, Up::Z);
     for i in 0..4000_u32 {
-        // A start within reach of a floor stands on it; from any other the feet come down by what it climbs
-        // at most.
+        // A start within a climb of a floor stands on it; from any other start the feet come down
+        // by at most a climb.
         let start = 0.36 + 0.0005 * f64::from(i);
         let (ended, steps) = walk(&map, [1.0, 1.0, start], &[[1.0, 1.0]], &Back);
         assert_eq!(ended, Ended::Arrived, "from {start}");
@@ -347,7 +347,7 @@ fn walks_end_as_they_are_told_to() {
         Ok::<_, WalkError>((ended, steps, walker.position(map.grid())))
     };
     let off = Ended::LeftMap { point: 0 };
-    // From where a fall is less than heights can tell; and without any points.
+    // Starts where a fall is less than the resolution of heights; and a route without points.
     for start in [[2.0, 6.0, -1e300], [2.0, 6.0, -1e18], [2.0, 6.0, -5.0], [1e300, 1e300, -1e300]] {
         assert_eq!(walked(start, &[[start[0], start[1]]]).unwrap().0, off, "from {start:?}");
         assert_eq!(walked(start, &[]).unwrap().0, off, "from {start:?}, without points");
@@ -428,7 +428,7 @@ fn many_avatars_walk_as_each_would_alone() {
     }
     assert_eq!(walkers, alone);
     assert!(blocked > 1000 && falling > 10, "{blocked} blocked, {falling} falling");
-    // Nobody ended inside anything: the box above what can be climbed is free.
+    // No avatar ended inside anything: the box above the climb is free.
     let AvatarOptions { climb, .. } = *avatar().options();
     for walker in &walkers {
         let feet = walker.position(map.grid());
