@@ -67,7 +67,6 @@ fn triangles(criterion: &mut Criterion) {
         group.bench_function("rounded", |bencher| {
             bencher.iter(|| pairs.iter().filter(|[a, b]| intersect(black_box(a), b)).count());
         });
-        #[expect(clippy::cast_possible_truncation, reason = "parry's triangles are single precision")]
         let single = |t: &Corners| {
             #[expect(clippy::cast_possible_truncation, reason = "parry's precision")]
             let single = |x: f64| x as f32;

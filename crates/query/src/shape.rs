@@ -3,7 +3,7 @@
 //! A shape touches a scan if it contains a point of it, for example when a robot made of spheres is
 //! tested against a depth frame. Points are stored in blocks of sixteen, with bounds about the
 //! blocks, about groups of sixteen blocks, and so on ([`nearmiss_index::BlockTree`]); the blocks
-//! are those of the scan. A grid lists the blocks near small spheres ([`nearmiss_index::Cells`]).
+//! are those of the scan. A grid lists the blocks near small spheres ([`nearmiss_index::BlockGrid`]).
 
 use std::ops::ControlFlow;
 
