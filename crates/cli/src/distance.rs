@@ -139,7 +139,7 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
         })?,
         None => {
             let poses = posing::of_options(&matrices, question.scans)?;
-            let _ = question.answer(None, &poses, &mut Scratch::default(), &mut results)?;
+            question.answer(None, &poses, &mut Scratch::default(), &mut results)?;
         }
     }
     results.flush()

@@ -12,19 +12,19 @@ use crate::input::pieces;
 use crate::parse::parse_length;
 use crate::{output, picture};
 
-/// Options of the avatar, as for `slices walk`.
+/// Options of the avatar.
 #[derive(Debug, Clone, Args)]
 pub struct AvatarArgs {
     /// Width, depth and height of the avatar
     #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.6", value_parser = parse_avatar)]
     pub avatar: AvatarBox,
-    /// Height that the avatar climbs at once
+    /// Height that the avatar climbs at once, and falls in a step
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
     pub climb: f64,
     /// Length of a step; by default a pixel's side
     ///
     /// It is also the distance between searched places. The lesser side of the avatar's base limits
-    /// it.
+    /// it, so that the avatar steps over nothing.
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
     pub step: Option<f64>,
 }

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nearmiss::slices::{
-    Avatar, AvatarOptions, Back, CacheCounts, CacheOptions, Ended, Response, Route, SliceCache, Slide, Step,
-    StoreError, Up, WalkError, Walker,
+    Back, CacheCounts, CacheOptions, Ended, Response, Route, SliceCache, Slide, Step, StoreError, Up,
+    WalkError, Walker,
 };
 use serde::Serialize;
 
-use super::avatar_args::{AvatarBox, parse_avatar};
+use super::avatar_args::AvatarArgs;
 use super::refusal::misplaced;
 use super::report::open;
 use super::track::Track;
@@ -18,7 +18,6 @@ use super::walk_picture;
 use crate::console::{self, Console, Results};
 use crate::digits::{count, short};
 use crate::error::CliError;
-use crate::parse::parse_length;
 use crate::{output, picture};
 
 /// Options of `slices walk`.
@@ -31,17 +30,9 @@ pub struct WalkArgs {
     /// The points are the two coordinates across the axis that points up.
     #[arg(long, value_name = "FILE.json")]
     pub route: PathBuf,
-    /// Width, depth and height of the avatar
-    #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.6", value_parser = parse_avatar)]
-    pub avatar: AvatarBox,
-    /// Height that the avatar climbs at once, and falls in a step
-    #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
-    pub climb: f64,
-    /// Length of a step; by default a pixel's side
-    ///
-    /// The lesser side of the avatar's base limits it, so that the avatar steps over nothing.
-    #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
-    pub step: Option<f64>,
+    /// The avatar
+    #[command(flatten)]
+    pub avatar: AvatarArgs,
     /// Response to something in the way
     #[arg(long, value_enum, default_value_t = ResponseName::Back)]
     pub response: ResponseName,
@@ -103,12 +94,7 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
     check_outputs(args)?;
     let route = read_route(args)?;
     let folder = open(&args.folder)?;
-    let AvatarBox([width, depth, height]) = args.avatar;
-    let options = AvatarOptions::default()
-        .with_box([width, depth], height)
-        .with_climb(args.climb)
-        .with_step(args.step.unwrap_or(folder.grid().pixel));
-    let avatar = Avatar::new(&options).map_err(|e| CliError::Usage(e.to_string()))?;
+    let avatar = args.avatar.avatar(folder.grid())?;
     let cache =
         args.cache.map_or(CacheOptions::default(), |slices| CacheOptions::default().with_slices(slices));
     let cache = cache.with_prefetch(!args.no_prefetch);
