@@ -42,7 +42,7 @@ impl UnitName {
     }
 }
 
-/// The unit of lengths in the world, as far as it is known.
+/// The unit of lengths in the world, if known.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum WorldUnit {
     /// The unit of the input, whatever that is.

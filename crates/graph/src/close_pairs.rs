@@ -184,7 +184,7 @@ impl ClosePairs {
     }
 
     /// Returns the length of a path from `i` to `j` if `j` is close to `i`, and sets `path` to its
-    /// points, both ends included. `path` is empty if there is none.
+    /// points, both ends included. `path` is empty if the points are not connected.
     ///
     /// The path is longer than the shortest by at most a fraction of 1e-4. `network` must hold the
     /// graph and the lengths that the map was built from. Does not allocate once warm.

@@ -99,7 +99,7 @@ impl Reach {
         })
     }
 
-    /// Returns the bounds of the places, in the caller's coordinates; `None` if there are none.
+    /// Returns the bounds of the places, in the caller's coordinates, or `None` without places.
     #[must_use]
     pub fn bounds(&self) -> Option<Aabb> {
         (!self.is_empty()).then(|| Aabb::of(self.positions()))

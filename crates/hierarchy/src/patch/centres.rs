@@ -51,7 +51,7 @@ impl Centres {
         &self.blocks[..self.len.div_ceil(WIDTH)]
     }
 
-    /// Returns the squared distance of the nearest position; infinite if there is none.
+    /// Returns the squared distance of the nearest position, or infinity without positions.
     #[inline(always)]
     pub(crate) fn nearest_sq(&self, p: [f32; 3]) -> f32 {
         let mut least = [f32::INFINITY; WIDTH];

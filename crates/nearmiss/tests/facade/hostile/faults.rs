@@ -116,7 +116,7 @@ fn a_scan_answers_the_same_while_its_file_is_replaced_and_removed() {
     assert_eq!(exercise(&open, &first), before, "even without a name");
 }
 
-/// A folder in which nobody, not even root, can create files.
+/// A folder in which not even root can create files.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_folder_that_takes_no_files_is_reported() {
