@@ -5,6 +5,7 @@ pub mod eigen;
 pub mod grid;
 pub mod jacobi;
 pub mod kiddo;
+pub mod mesh;
 mod method;
 pub mod ours;
 pub mod parry;
@@ -18,8 +19,8 @@ pub use method::{Method, Reply};
 use crate::Failure;
 use crate::object::Object;
 
-/// Names of rivals.
-pub const NAMES: [&str; 3] = ["parry", "trimesh", "kiddo"];
+/// Names of rivals. `mesh` is our own query of the object's mesh.
+pub const NAMES: [&str; 4] = ["mesh", "parry", "trimesh", "kiddo"];
 
 /// Returns a rival by its name, one of [`NAMES`], or `None` if it needs a mesh and the object has
 /// none.
@@ -31,6 +32,7 @@ pub fn rival(name: &str, object: &Object) -> Result<Option<Box<dyn Method>>, Fai
         object.mesh.as_ref().map(make).transpose()
     };
     match name {
+        "mesh" => of_mesh(|mesh| Ok(Box::new(mesh::OurMesh::new(mesh)?))),
         "parry" => of_mesh(|mesh| Ok(Box::new(parry::MeshTree::new(mesh)))),
         "trimesh" => of_mesh(|mesh| Ok(Box::new(trimesh::Shape::new(mesh)?))),
         "kiddo" => Ok(Some(Box::new(kiddo::PointScan::new(&object.cloud, object.r)?))),

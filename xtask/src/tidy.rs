@@ -28,11 +28,25 @@ const LAYERS: [(&str, &[&str]); 18] = [
     ("nearmiss-surface", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index"]),
     (
         "nearmiss-graph",
-        &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index", "nearmiss-surface", "nearmiss-store"],
+        &[
+            "nearmiss-geometry",
+            "nearmiss-lanes",
+            "nearmiss-index",
+            "nearmiss-mesh",
+            "nearmiss-surface",
+            "nearmiss-store",
+        ],
     ),
     (
         "nearmiss-hierarchy",
-        &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index", "nearmiss-surface", "nearmiss-store"],
+        &[
+            "nearmiss-geometry",
+            "nearmiss-lanes",
+            "nearmiss-index",
+            "nearmiss-mesh",
+            "nearmiss-surface",
+            "nearmiss-store",
+        ],
     ),
     (
         "nearmiss-query",
@@ -43,6 +57,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
             "nearmiss-surface",
             "nearmiss-graph",
             "nearmiss-hierarchy",
+            "nearmiss-mesh",
         ],
     ),
     ("nearmiss-mesh", &["nearmiss-geometry"]),

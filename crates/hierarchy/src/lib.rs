@@ -4,6 +4,7 @@
 mod bounds;
 mod descent;
 mod file;
+mod mesh;
 mod patch;
 mod point;
 mod scan;
@@ -16,6 +17,10 @@ pub use descent::{
     BoxVisitor, Comparison, Frontier, Heap, MostUrgent, Open, PairVisitor, PlaceVisitor, Plunging, Stack,
     TreePair, descend, resume,
 };
+pub use mesh::block::{LEAF_TRIANGLES, TriangleBlock};
+pub use mesh::build::{MeshHierarchy, MeshView};
+pub use mesh::data::{DroppedTriangles, MeshMeta};
+pub use mesh::options::{MeshBuildError, MeshBuildOptions};
 pub use patch::covering::Covering;
 pub use patch::samples::NodeSamples;
 pub use point::disc::DiscRadii;

@@ -32,16 +32,17 @@ pub use nearmiss_surface as surface;
 pub use nearmiss_geometry::{Aabb, CloudError, Intake, PointCloud, PointId, Pose, PoseError, TriangleMesh};
 pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{
-    BuildError, BuildOptions, GatheredPoints, IntakeError, PointGatherer, PointHierarchy, PointKind,
-    ScanPoints,
+    BuildError, BuildOptions, GatheredPoints, IntakeError, MeshBuildError, MeshBuildOptions, MeshHierarchy,
+    PointGatherer, PointHierarchy, PointKind, ScanPoints,
 };
 pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan,
     Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, Contacts, Curve, CurveEnd, CurveOptions,
     CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence, Interpolation,
-    ManifoldPoint, Method, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlanError, Prepared, Proof,
-    Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize,
-    Until, Verdict, World, each,
+    ManifoldPoint, MeshAnswer, MeshContact, MeshHint, MeshPair, MeshScratch, MeshVerdict, Method,
+    NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedMesh, PlanError, Prepared, Proof, Question,
+    Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize, Until,
+    Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

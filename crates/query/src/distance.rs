@@ -19,9 +19,8 @@ use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semant
 use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
 use crate::leaf::nearest_points::PointPair;
 use crate::pair::meter::Meter;
-use crate::pair::motion::Motion;
 use crate::pair::placed::{Placed, ViewScratch};
-use crate::pair::scan_pair::{ScanPair, relative};
+use crate::pair::scan_pair::{ScanPair, motion_of, relative};
 use approach::{Approach, Feet};
 pub(crate) use search::Frontier;
 use search::Search;
@@ -158,7 +157,7 @@ pub(crate) fn distance(
         };
     };
     let (level, meter) = (contact.level, Meter::new(budget, views, 0));
-    let motion = Motion::new(views, &pose);
+    let motion = motion_of(views, &pose);
     let slices = views.map(|view| view.scan().slices());
     let semantics = plan.options.semantics;
     let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, semantics.part()));

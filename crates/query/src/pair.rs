@@ -5,6 +5,7 @@ pub(crate) mod likelihood;
 pub(crate) mod meter;
 pub(crate) mod motion;
 pub(crate) mod placed;
+pub(crate) mod placed_balls;
 pub(crate) mod prepared;
 pub(crate) mod scan_pair;
 pub(crate) mod shape_index;

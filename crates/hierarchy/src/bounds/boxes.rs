@@ -71,6 +71,16 @@ impl OrientedBox {
         x * x + y * y + z * z
     }
 
+    /// Returns `true` if the box contains all `points`, up to rounding.
+    pub(crate) fn holds(&self, points: impl IntoIterator<Item = [f32; 3]>) -> bool {
+        let size = |v: [f32; 3]| v[0].abs() + v[1].abs() + v[2].abs();
+        let slack = ROUNDING * (size(self.centre) + size(self.half));
+        points.into_iter().all(|p| {
+            let d = sub(p, self.centre);
+            (0..3).all(|k| dot(self.axes[k], d).abs() <= self.half[k] + slack)
+        })
+    }
+
     /// Returns the distance from the centre to a corner.
     #[must_use]
     pub fn radius(&self) -> f32 {
@@ -124,7 +134,8 @@ impl Relative {
 
     /// Transforms four points of b's frame to a's.
     #[inline(always)]
-    pub(crate) fn points_of_four<S: Simd>(&self, p: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    #[must_use]
+    pub fn points_of_four<S: Simd>(&self, p: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
         let [x, y, z] = turned(&self.linear, p);
         let [tx, ty, tz] = self.translation;
         [x + tx, y + ty, z + tz]

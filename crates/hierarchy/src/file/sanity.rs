@@ -17,7 +17,8 @@ use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_store::Flaw;
 
-pub(crate) use metadata::checked_topology;
+pub(crate) use metadata::{checked_topology, frame_is_valid};
+pub(crate) use nodes::{check as check_boxes, is_in_range};
 
 use crate::scan::build::PointHierarchy;
 
@@ -33,7 +34,7 @@ impl PointHierarchy {
     /// its parent's, every number of every point is one that a build can write and is within the
     /// bounds of its leaf, and derived data match the points. One pass over the whole.
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
-        nodes::check(self)?;
+        nodes::check(&self.tree())?;
         points::check(self)?;
         leaves::check(self)?;
         samples::check(self)?;

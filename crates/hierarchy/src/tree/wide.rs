@@ -112,7 +112,7 @@ pub struct Tree<'a> {
     pub(crate) root: &'a Root,
     /// The boxes of the children of each inner node.
     pub(crate) siblings: &'a [Siblings],
-    /// The growths of the same children, by [`Part`].
+    /// The growths of the same children, by [`Part`]. Without entries, enclosures are the boxes.
     pub(crate) growths: [&'a [Growths]; 2],
 }
 
@@ -141,9 +141,16 @@ impl<'a> Tree<'a> {
     #[inline]
     pub(crate) fn growth(&self, part: Part, id: NodeId) -> Growth {
         match self.topology.parent(id) {
-            Some((parent, lane)) => self.growths[part as usize][parent.index()].get(lane),
+            Some((parent, lane)) => self.growths_below(part, parent.index()).get(lane),
             None => self.root.growths[part as usize],
         }
+    }
+
+    /// Returns the growths of the children of an inner node.
+    #[inline(always)]
+    fn growths_below(&self, part: Part, of: usize) -> &Growths {
+        const NONE: Growths = Growths([[0; FAN]; 3]);
+        self.growths[part as usize].get(of).unwrap_or(&NONE)
     }
 
     /// Returns a box that provably contains a node's part of the surface or of the obstacle
@@ -225,7 +232,7 @@ impl<'a> Tree<'a> {
     #[inline(always)]
     fn siblings<S: Simd>(&self, simd: S, part: Part, of: usize) -> NodeBounds<f32x4<S>> {
         let Siblings { centre, half, axes: [u, v, w], .. } = &self.siblings[of];
-        let Growths([first, second, third]) = &self.growths[part as usize][of];
+        let Growths([first, second, third]) = self.growths_below(part, of);
         let ((lx, ly), (lz, gx), (gy, gz)) = (halves(simd, first), halves(simd, second), halves(simd, third));
         NodeBounds {
             centre: rows(simd, centre),

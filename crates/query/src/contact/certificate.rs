@@ -107,7 +107,7 @@ impl<'c, 'a> Certifier<'c, 'a> {
         scratch: &mut ProofScratch,
         (proof, is_hinted): (Option<&mut Proof>, bool),
     ) -> Option<(f64, f64)> {
-        let motion = &Motion::new(self.pair.views, pose);
+        let motion = &self.pair.motion(pose);
         let (pair, reach) = (&*self.pair, self.reach);
         let fails =
             |&leaves: &NodePair| !pair.are_leaves(leaves) || are_doubtful(pair, motion, leaves, reach);
@@ -161,7 +161,7 @@ impl<'c, 'a> Certifier<'c, 'a> {
         open: &[NodePair],
         scratch: &mut ProofScratch,
     ) -> Option<()> {
-        let motion = &Motion::new(self.pair.views, pose);
+        let motion = &self.pair.motion(pose);
         scratch.clear();
         self.proven.clear();
         for &pair in open {

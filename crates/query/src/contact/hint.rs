@@ -17,7 +17,6 @@ use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, Topology, descen
 use crate::ask::options::CollideOptions;
 use crate::contact::certificate::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::contact::search::{Closer, Surfaces};
-use crate::pair::motion::Motion;
 use crate::pair::scan_pair::ScanPair;
 
 /// A frontier that has grown to this many times its fresh length is dropped: its nodes are smaller
@@ -190,7 +189,7 @@ impl Known {
     /// this also requires that the proof would fail again.
     pub(crate) fn has_front(&self, pair: &ScanPair<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
-            let motion = self.pose.map(|pose| Motion::new(pair.views, &pose));
+            let motion = self.pose.map(|pose| pair.motion(&pose));
             pair.are_leaves(leaves) && motion.is_some_and(|motion| are_doubtful(pair, &motion, leaves, reach))
         };
         self.is_slow(pair, SLOW)

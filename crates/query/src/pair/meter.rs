@@ -56,6 +56,12 @@ impl Meter {
         let leaf_pair = points[0] * points[1] / POINTS_A_PAIR
             + NODE_PAIRS_A_LEAF_PAIR
             + PAIRS_AN_EVALUATION * evaluations;
+        Self::of_leaves(budget, leaves, leaf_pair)
+    }
+
+    /// A meter for two trees with these numbers of leaves, whose leaf pairs cost as much as
+    /// `leaf_pair` node pairs each.
+    pub(crate) fn of_leaves(budget: &Budget, leaves: [u64; 2], leaf_pair: u64) -> Self {
         let sane = (LEAF_PAIRS_A_LEAF * (leaves[0] + leaves[1])).saturating_mul(leaf_pair);
         let most_work = if budget.work.is_some() { u64::MAX } else { sane };
         Self {

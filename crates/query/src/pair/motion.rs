@@ -19,10 +19,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
-use nearmiss_hierarchy::{NodeBounds, SLACK};
+use nearmiss_hierarchy::{NodeBounds, OrientedBox, SLACK};
 use nearmiss_lanes::wide::{bits, product};
-
-use crate::pair::placed::Placed;
 
 /// Projections back and forth. With one, the descent visits 0.5 % more pairs than with exact
 /// distances.
@@ -79,22 +77,22 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 }
 
 impl Motion {
-    /// Prepares the relative pose `pose` of two placed scans.
+    /// Prepares the relative pose `pose` of two things with the boxes `roots`, whose stored frames
+    /// are `placed` in the world.
     #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
-    pub(crate) fn new([a, b]: [&Placed<'_>; 2], pose: &Pose) -> Self {
-        let [root_a, root_b] = [a, b].map(|view| view.scan().root_box());
+    pub(crate) fn new([root_a, root_b]: [&OrientedBox; 2], placed: [&Pose; 2], pose: &Pose) -> Self {
         let [ca, cb] = [root_a, root_b].map(|root| Vector3::from(root.centre.map(f64::from)));
         let turned = pose.scale() * (pose.rotation() * cb);
         let offset = turned + Vector3::from(pose.translation()) - ca;
         let distance = offset.norm();
         let extent =
             ca.norm() + f64::from(root_a.radius()) + pose.scale() * (cb.norm() + f64::from(root_b.radius()));
-        let to_world = a.placed().scale();
+        let to_world = placed[0].scale();
         // Distances are claimed in the world, where both scans may be far from the origin and
         // rotation matrices are orthogonal only up to rounding.
-        let far: f64 = [a, b].map(|view| Vector3::from(view.placed().translation()).norm()).iter().sum();
-        let skew = [a, b].map(|view| {
-            let rotation = view.placed().rotation();
+        let far: f64 = placed.iter().map(|placed| Vector3::from(placed.translation()).norm()).sum();
+        let skew = placed.map(|placed| {
+            let rotation = placed.rotation();
             (rotation.tr_mul(rotation) - Matrix3::identity()).amax()
         });
         let of_doubles = (DOUBLE_ROUNDING + 4.0 * skew[0].max(skew[1])) * (extent + distance)

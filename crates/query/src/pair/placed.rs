@@ -6,6 +6,7 @@ use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, Slices};
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Metric};
 
+use crate::pair::placed_balls::is_proper;
 use crate::pair::shape_index::ShapeIndex;
 
 /// Reusable memory for evaluations of f; never influences a result.
@@ -104,15 +105,7 @@ impl<'a> Placed<'a> {
     /// Returns `true` if the pose is finite and its linear part is a rotation with a positive
     /// scale. Products of many poses may drift away from that.
     pub(crate) fn is_proper(&self) -> bool {
-        let (pose, rotation) = (&self.placed, self.placed.rotation());
-        let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];
-        // Two unit vectors at right angles, and their cross product.
-        let (third, across) = (u.cross(&v) - w, u.dot(&v));
-        let off = (u.norm_squared() - 1.0).abs() + (v.norm_squared() - 1.0).abs() + across.abs();
-        // Sum up without branches; a sum with NaN is NaN and fails the comparison.
-        let off = off + third.x.abs() + third.y.abs() + third.z.abs();
-        let far: f64 = pose.translation().iter().map(|x| x.abs()).sum();
-        off <= MOST_OFF && far < f64::INFINITY && pose.scale() > 0.0
+        is_proper(&self.placed)
     }
 
     /// Returns `true` if `x` belongs to the obstacle. `x` is a world point of the implicit surface
@@ -233,7 +226,3 @@ impl<'a> Placed<'a> {
         }
     }
 }
-
-/// Tolerance of [`Placed::is_proper`]: the summed errors of the lengths, the angle and the cross
-/// product of the rotation's columns.
-const MOST_OFF: f64 = 6e-9;

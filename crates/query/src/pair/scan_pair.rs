@@ -1,15 +1,15 @@
 //! Two scans under a relative pose, and the operations on node pairs that all searches share.
 
 use fearless_simd::Level;
-use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, Slices, TreePair};
+use nearmiss_hierarchy::{NodePair, Part, Relative, Slices, TreePair};
 
 use crate::ask::options::{CollidePlan, Semantics};
 use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
 use crate::pair::motion::Motion;
 use crate::pair::placed::Placed;
+use crate::pair::placed_balls::PlacedBalls;
 
 /// Two placed scans, their arrays, the relative pose, and the cost of the search.
 #[derive(Debug)]
@@ -77,6 +77,11 @@ impl<'a> ScanPair<'a> {
         TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach }
     }
 
+    /// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
+    pub(crate) fn motion(&self, pose: &Pose) -> Motion {
+        motion_of(self.views, pose)
+    }
+
     /// The trees of both scans, for a descent by distance.
     pub(crate) fn bounds<'t>(&self, motion: &'t Motion) -> Bounds<'t>
     where
@@ -123,13 +128,14 @@ impl<'a> ScanPair<'a> {
     }
 }
 
+/// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
+pub(crate) fn motion_of(views: [&Placed<'_>; 2], pose: &Pose) -> Motion {
+    Motion::new(views.map(|view| view.scan().root_box()), views.map(Placed::placed), pose)
+}
+
 /// From this many radii on, the distance of the bounding balls is a good bound, and single
 /// precision loses accuracy.
 const FAR_APART: f64 = 100.0;
-
-/// Scans whose stored frames differ in scale by more than this are not compared in single
-/// precision.
-const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 
 /// Returns b's pose in a's stored frame, in double and in single precision. Fails with the distance
 /// of the scans' bounding balls if that exceeds the reach of the plan, or with `None` for invalid
@@ -139,76 +145,30 @@ pub(crate) fn relative(
     b: &Placed<'_>,
     plan: &CollidePlan,
 ) -> Result<(Pose, Relative), Option<f64>> {
-    let ratio = b.placed().scale() / a.placed().scale();
-    if !(a.is_proper() && b.is_proper() && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
-        return Err(None);
-    }
     let about = |view: &Placed<'_>| match plan.options().semantics {
         Semantics::Obstacle => view.scan().outline().obstacle,
         Semantics::Surface => view.scan().outline().surface,
         Semantics::Thickened(_) => view.scan().outline().discs,
     };
-    let own = about(a);
-    let Balls { distance, radii: [ra, rb], gap, lost } = Balls::of([a, b], [own, about(b)]);
-    if gap.is_nan() || gap == f64::INFINITY {
-        return Err(None);
-    }
+    let balls = PlacedBalls::of([a.placed(), b.placed()], [about(a), about(b)]).ok_or(None)?;
     // A certificate proves more than the balls, unless the scans are so far apart that balls give
     // nearly the whole distance.
-    if gap > plan.reach() && (!plan.options().certifies() || gap > FAR_APART * (ra + rb)) {
+    let gap = balls.gap;
+    if gap > plan.reach()
+        && (!plan.options().certifies() || gap > FAR_APART * (balls.radii[0] + balls.radii[1]))
+    {
         return Err(Some(gap));
     }
-    let pose = a.placed().inverse().after(b.placed());
-    // Coordinates in a's stored frame, of a's own points and of b's.
-    let extent = size(own.centre.into()) + (distance + ra + 2.0 * rb) / a.placed().scale();
-    let shift = size(pose.translation().into());
-    // The slack of `Relative` is proportional to the extent passed to it.
-    let lost = lost / a.placed().scale() / f64::from(SLACK);
-    let relative = Relative::new(&pose, extent + shift + lost);
-    Ok((pose, relative))
-}
-
-/// An upper bound of the norm of `v` that takes no square root.
-fn size(v: Vector3<f64>) -> f64 {
-    v.x.abs() + v.y.abs() + v.z.abs()
-}
-
-/// The bounding balls of two scans in the world.
-struct Balls {
-    /// The distance of the centres.
-    distance: f64,
-    radii: [f64; 2],
-    /// A lower bound of the distance of the balls.
-    gap: f64,
-    /// The rounding error in double precision, which grows with the distance from the world's
-    /// origin.
-    lost: f64,
-}
-
-impl Balls {
-    /// Places the `stored` balls, given in the frames of the scans, in the world.
-    fn of([a, b]: [&Placed<'_>; 2], stored: [Ball; 2]) -> Self {
-        let placed = |view: &Placed<'_>, ball: &Ball| {
-            (Vector3::from(view.placed().apply(ball.centre)), ball.radius * view.placed().scale())
-        };
-        let ((ca, ra), (cb, rb)) = (placed(a, &stored[0]), placed(b, &stored[1]));
-        let far = |view: &Placed<'_>| size(view.placed().translation().into());
-        let lost = DOUBLE_ROUNDING * (far(a) + far(b) + size(ca) + size(cb));
-        let distance = (ca - cb).norm();
-        let gap = distance * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6) - lost;
-        Self { distance, radii: [ra, rb], gap, lost }
-    }
+    Ok(balls.relative())
 }
 
 /// A lower bound of the distance of this part of two scans in the world: the gap of their bounding
-/// balls, negative if these overlap.
+/// balls, negative if these overlap. NaN for invalid poses.
 pub(crate) fn balls_apart([a, b]: [&Placed<'_>; 2], part: Part) -> f64 {
     let about = |view: &Placed<'_>| match part {
         Part::Obstacle => view.scan().outline().obstacle,
         Part::Surface => view.scan().outline().surface,
     };
-    Balls::of([a, b], [about(a), about(b)]).gap
+    let balls = PlacedBalls::of([a.placed(), b.placed()], [about(a), about(b)]);
+    balls.map_or(f64::NAN, |balls| balls.gap)
 }
-
-/// About ten roundings of 2⁻⁵³ each, from composing and applying poses.
-const DOUBLE_ROUNDING: f64 = 2e-15;

@@ -32,6 +32,12 @@ pub(crate) fn checked_topology(points: usize, leaf_size: u32, dense: u32) -> Res
     Ok(Topology::new(count, leaf_size))
 }
 
+/// Returns `true` if nothing overflows on the way to the caller's frame and back.
+pub(crate) fn frame_is_valid(&Frame { origin, scale }: &Frame) -> bool {
+    let turns_back = scale > 0.0 && scale.is_normal() && scale.recip().is_normal();
+    turns_back && origin.iter().all(|x| x.is_finite())
+}
+
 impl PointHierarchy {
     pub(super) fn check_lengths(&self) -> Result<(), Flaw> {
         let points = self.len();
@@ -62,10 +68,7 @@ impl PointHierarchy {
     /// Checks the metadata, as far as possible without the points.
     pub(super) fn check_metadata(&self) -> Result<(), Flaw> {
         let wrong = |what| Err(Flaw::Metadata { what });
-        let Frame { origin, scale } = self.meta.frame;
-        // With such a scale nothing overflows on the way to the caller's frame and back.
-        let turns_back = scale > 0.0 && scale.is_normal() && scale.recip().is_normal();
-        if !(turns_back && origin.iter().all(|x| x.is_finite())) {
+        if !frame_is_valid(&self.meta.frame) {
             return wrong("the frame of the stored positions");
         }
         let Aabb { min, max } = self.meta.bounds;

@@ -12,8 +12,8 @@ use nearmiss_store::Flaw;
 use super::limits::FARTHEST;
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
-use crate::scan::build::PointHierarchy;
-use crate::tree::wide::Siblings;
+use crate::bounds::part::Part;
+use crate::tree::wide::{Siblings, Tree};
 
 /// Tolerance for unit and orthogonal axes: far above rounding errors, far below those of a corrupt
 /// box.
@@ -45,7 +45,7 @@ const RANGES: [(u32, u32); NUMBERS] = {
 };
 
 /// Returns `true` if the numbers of a box are in their ranges: centre, half edges, axes, reach.
-pub(super) fn is_in_range(bounds: &OrientedBox) -> bool {
+pub(crate) fn is_in_range(bounds: &OrientedBox) -> bool {
     let bits: &[u32; NUMBERS] = cast_ref(bounds);
     let mut beyond = 0;
     for (x, (mask, most)) in bits.iter().zip(RANGES) {
@@ -56,11 +56,11 @@ pub(super) fn is_in_range(bounds: &OrientedBox) -> bool {
 
 /// Checks the boxes and enclosures of all nodes: the numbers are in their ranges, axes form a
 /// frame, each box is within its parent's, and unused lanes are zero.
-pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
-    let (topology, tree) = (scan.topology(), scan.tree());
+pub(crate) fn check(tree: &Tree<'_>) -> Result<(), Flaw> {
+    let topology = tree.topology;
     let wrong = |what, id: NodeId| Err(Flaw::Value { what, index: id.index() });
     let is_sound = |bounds: &OrientedBox| is_in_range(bounds) && is_frame(&bounds.axes);
-    if !is_sound(&scan.meta.root.bounds) {
+    if !is_sound(&tree.root.bounds) {
         return wrong("the box of node", NodeId::ROOT);
     }
     let found = ranges(topology.inner(), |parents| {
@@ -75,7 +75,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
                 if !(is_sound(&bounds) && lies_within(&bounds, &own)) {
                     return wrong("the box of node", child);
                 }
-                let growths = tree.growths.map(|of| of[parent].get(lane));
+                let growths = [Part::Surface, Part::Obstacle].map(|part| tree.growth(part, child));
                 if !growths.iter().all(Growth::is_sound) {
                     return wrong("the enclosure of node", child);
                 }

@@ -1,0 +1,9 @@
+//! A prepared mesh: its triangles in the order of a tree, and the boxes around them.
+
+pub(crate) mod block;
+pub(crate) mod build;
+pub(crate) mod data;
+pub(crate) mod extents;
+pub(crate) mod moments;
+pub(crate) mod options;
+pub(crate) mod stored;

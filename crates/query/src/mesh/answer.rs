@@ -1,0 +1,58 @@
+//! The answers about two meshes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ask::answer::Statistics;
+
+/// The verdict on whether two meshes meet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum MeshVerdict {
+    /// A triangle of each shares a point. Decided exactly, for the corners of both triangles as they
+    /// are rounded in a's frame.
+    Intersecting(MeshContact),
+    /// No two triangles share a point.
+    Separated,
+    /// A budget ended the search before it was decided. The likelihood of the answer says which
+    /// verdict is more probable.
+    Undecided,
+    /// A pose is invalid: it is not finite, not a rotation or has no positive scale.
+    Pose,
+}
+
+impl MeshVerdict {
+    /// Returns `true` if the meshes meet.
+    #[must_use]
+    pub const fn is_intersecting(&self) -> bool {
+        matches!(self, Self::Intersecting(_))
+    }
+
+    /// Returns `true` if the meshes are separated.
+    #[must_use]
+    pub const fn is_separated(&self) -> bool {
+        matches!(self, Self::Separated)
+    }
+}
+
+/// A contact of a triangle of a and a triangle of b, in the world.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeshContact {
+    /// A common point: the middle of [`ends`](Self::ends), or the centre of what triangles in one
+    /// plane have in common.
+    pub point: [f64; 3],
+    /// The ends of the segment that the triangles have in common; equal if they touch in a point.
+    pub ends: [[f64; 3]; 2],
+    /// Unit normals of both triangles, on the side from which their corners turn counterclockwise.
+    pub normals: [[f64; 3]; 2],
+    /// The triangles, as the caller numbered them.
+    pub triangles: [u32; 2],
+}
+
+/// A verdict about two meshes and its cost.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeshAnswer {
+    /// The verdict.
+    pub verdict: MeshVerdict,
+    /// The cost: node pairs compared, and leaf pairs whose triangles were compared.
+    pub statistics: Statistics,
+}

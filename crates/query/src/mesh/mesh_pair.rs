@@ -1,0 +1,102 @@
+//! Two prepared meshes under a relative pose, and the cost of a search.
+
+use fearless_simd::Level;
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::{LEAF_TRIANGLES, MeshView, Relative, TreePair};
+use nearmiss_mesh::Corners;
+
+use crate::ask::budget::Budget;
+use crate::mesh::answer::MeshContact;
+use crate::mesh::placed::PlacedMesh;
+use crate::mesh::triangle_pairs::may_meet;
+use crate::pair::meter::Meter;
+use crate::pair::placed_balls::PlacedBalls;
+
+/// The cost of a leaf pair, in node pairs.
+const LEAF_PAIR: u64 = 16;
+
+/// Two placed meshes, their arrays, the relative pose, and the cost of the search.
+#[derive(Debug)]
+pub(crate) struct MeshPairing<'a> {
+    pub(crate) meshes: [PlacedMesh<'a>; 2],
+    pub(crate) a: &'a MeshView<'a>,
+    pub(crate) b: &'a MeshView<'a>,
+    /// The pose of b's stored frame in a's.
+    pub(crate) stored: Pose,
+    /// The same in single precision.
+    pub(crate) relative: Relative,
+    /// The pose of b's input in the frame of a's input.
+    pose: Pose,
+    /// A lower bound of the distance of the bounding balls, in the world.
+    pub(crate) gap: f64,
+    pub(crate) meter: Meter,
+    /// The SIMD instructions to use. Results do not depend on them.
+    pub(crate) level: Level,
+}
+
+impl<'a> MeshPairing<'a> {
+    /// Returns `None` if a pose is invalid.
+    pub(crate) fn new(
+        meshes: [PlacedMesh<'a>; 2],
+        [a, b]: [&'a MeshView<'a>; 2],
+        budget: &Budget,
+        level: Level,
+    ) -> Option<Self> {
+        let balls = PlacedBalls::of([meshes[0].placed(), meshes[1].placed()], [*a.ball, *b.ball])?;
+        let (stored, relative) = balls.relative();
+        let pose = meshes[0].pose().inverse().after(meshes[1].pose());
+        let leaves = [a, b].map(|mesh| mesh.tree.topology().leaves() as u64);
+        let meter = Meter::of_leaves(budget, leaves, LEAF_PAIR);
+        let gap = balls.gap;
+        Some(Self { meshes, a, b, stored, relative, pose, gap, meter, level })
+    }
+
+    /// The trees of both meshes, for a descent that prunes pairs whose boxes are disjoint.
+    pub(crate) fn trees<'t>(&self, relative: &'t Relative) -> TreePair<'t>
+    where
+        'a: 't,
+    {
+        TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach: relative.slack() }
+    }
+
+    /// Returns the corners of the `i`-th triangle of a and the `j`-th of b in the frame of a's input.
+    #[inline]
+    pub(crate) fn corners(&self, [i, j]: [usize; 2]) -> [Corners; 2] {
+        [self.a.corners(i), self.b.corners(j).map(|p| self.pose.apply(p))]
+    }
+
+    /// Counts two leaves, and returns the lanes of their triangle pairs that may meet; see
+    /// [`may_meet`].
+    #[inline]
+    pub(crate) fn lanes_that_may_meet(&mut self, [a, b]: [usize; 2]) -> u32 {
+        self.meter.spent.leaf_pairs += 1;
+        self.meter.leaf_work(LEAF_PAIR);
+        may_meet(self.level, [&self.a.blocks[a], &self.b.blocks[b]], &self.relative) & self.lanes([a, b])
+    }
+
+    /// The lanes in use by the triangle pairs of two leaves, as bits.
+    pub(crate) fn lanes(&self, [a, b]: [usize; 2]) -> u32 {
+        let count = |mesh: &MeshView<'_>, leaf: usize| mesh.tree.topology().points_of_leaf(leaf).len();
+        let (a, b) = (count(&self.a, a), count(&self.b, b));
+        ((1 << a) - 1) * (0x1111 & ((1 << (4 * b)) - 1))
+    }
+
+    /// The triangles in a lane of two leaves.
+    #[inline]
+    pub(crate) fn triangles([a, b]: [usize; 2], lane: usize) -> [usize; 2] {
+        [a * LEAF_TRIANGLES + lane % LEAF_TRIANGLES, b * LEAF_TRIANGLES + lane / LEAF_TRIANGLES]
+    }
+
+    /// The contact of two triangles in the world; `None` if they do not meet.
+    pub(crate) fn contact(&self, triangles: [usize; 2]) -> Option<MeshContact> {
+        let [a, b] = self.corners(triangles);
+        let contact = nearmiss_mesh::triangle_contact(&a, &b)?;
+        let pose = self.meshes[0].pose();
+        Some(MeshContact {
+            point: pose.apply(contact.point),
+            ends: contact.ends.map(|end| pose.apply(end)),
+            normals: contact.normals.map(|normal| pose.rotate(normal.unwrap_or([0.0; 3]))),
+            triangles: [self.a.source[triangles[0]], self.b.source[triangles[1]]],
+        })
+    }
+}

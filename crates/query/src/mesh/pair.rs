@@ -1,0 +1,131 @@
+//! A pair of placed meshes and the questions about it.
+
+use fearless_simd::Level;
+use nearmiss_hierarchy::Stack;
+
+use crate::ask::answer::Statistics;
+use crate::ask::budget::Budget;
+use crate::mesh::answer::{MeshAnswer, MeshContact, MeshVerdict};
+use crate::mesh::collide::collide;
+use crate::mesh::mesh_pair::MeshPairing;
+use crate::mesh::placed::PlacedMesh;
+
+/// Working memory of queries about meshes, one per thread. Reuse it: a query does not allocate once
+/// its scratch is warm. It holds no answers and never changes one.
+#[derive(Debug, Clone)]
+pub struct MeshScratch {
+    level: Level,
+    stack: Stack,
+}
+
+impl Default for MeshScratch {
+    fn default() -> Self {
+        Self::by_level(Level::new())
+    }
+}
+
+impl MeshScratch {
+    /// A scratch whose queries run with the SIMD instructions of `level` instead of the best
+    /// available ones, for comparisons. Answers do not depend on it.
+    #[must_use]
+    pub fn by_level(level: Level) -> Self {
+        Self { level, stack: Stack::default() }
+    }
+}
+
+/// The triangles that met in the last query of a pair of meshes. A query that starts from them
+/// answers at once if they still meet. A hint never changes a verdict.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct MeshHint {
+    met: Option<[u32; 2]>,
+}
+
+/// Two placed meshes and the budget of each question about them.
+///
+/// ```
+/// use nearmiss_geometry::{Pose, TriangleMesh};
+/// use nearmiss_hierarchy::{MeshBuildOptions, MeshHierarchy};
+/// use nearmiss_query::{MeshPair, MeshScratch, MeshVerdict, PlacedMesh};
+///
+/// let corners = vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+/// let mesh = TriangleMesh::new(corners, vec![[0, 1, 2]])?;
+/// let prepared = MeshHierarchy::build(&mesh, &MeshBuildOptions::default())?;
+///
+/// let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
+/// let at = |height| {
+///     let pose = upright.with_translation([0.5, 1.0, height]);
+///     MeshPair::new(PlacedMesh::new(&prepared, &Pose::IDENTITY), PlacedMesh::new(&prepared, &pose))
+/// };
+/// let mut scratch = MeshScratch::default();
+/// let MeshVerdict::Intersecting(contact) = at(-1.0).collide(&mut scratch).verdict else {
+///     panic!("the upright triangle passes through the lying one");
+/// };
+/// assert!((contact.point[1] - 1.0).abs() < 1e-12 && contact.point[2].abs() < 1e-12);
+/// assert!(at(0.5).collide(&mut scratch).verdict.is_separated());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct MeshPair<'a> {
+    meshes: [PlacedMesh<'a>; 2],
+    budget: Budget,
+}
+
+impl<'a> MeshPair<'a> {
+    /// A pair with an unlimited budget.
+    #[inline]
+    #[must_use]
+    pub fn new(a: PlacedMesh<'a>, b: PlacedMesh<'a>) -> Self {
+        Self { meshes: [a, b], budget: Budget::UNLIMITED }
+    }
+
+    /// The same pair with this budget for each question. A resolution is ignored.
+    #[inline]
+    #[must_use]
+    pub fn within(self, budget: &Budget) -> Self {
+        Self { budget: *budget, ..self }
+    }
+
+    /// Both meshes.
+    #[must_use]
+    pub fn meshes(&self) -> &[PlacedMesh<'a>; 2] {
+        &self.meshes
+    }
+
+    /// Decides whether a triangle of a and a triangle of b share a point. Exact without a budget;
+    /// touching counts. Does not allocate once `scratch` is warm.
+    pub fn collide(&self, scratch: &mut MeshScratch) -> MeshAnswer {
+        let MeshScratch { level, stack } = scratch;
+        self.ask(*level, |pair| collide(pair, stack, None, None)).unwrap_or(INVALID)
+    }
+
+    /// Like [`Self::collide`], but tries the triangles of `hint` first, and updates it.
+    pub fn collide_hinted(&self, hint: &mut MeshHint, scratch: &mut MeshScratch) -> MeshAnswer {
+        let MeshScratch { level, stack } = scratch;
+        self.ask(*level, |pair| collide(pair, stack, Some(&mut hint.met), None)).unwrap_or(INVALID)
+    }
+
+    /// Finds every pair of triangles that meet and writes their contacts to `contacts`, as far as
+    /// the budget lasts. Returns the answer, and `true` if the list is complete.
+    ///
+    /// Costs a descent to all intersecting leaves, and about 1.5 µs for each contact.
+    pub fn contacts(&self, contacts: &mut Vec<MeshContact>, scratch: &mut MeshScratch) -> (MeshAnswer, bool) {
+        contacts.clear();
+        let mut complete = false;
+        let MeshScratch { level, stack } = scratch;
+        let all = (contacts, &mut complete);
+        let answer = self.ask(*level, |pair| collide(pair, stack, None, Some(all))).unwrap_or(INVALID);
+        (answer, complete)
+    }
+
+    /// Calls `ask` with the pair under its relative pose; `None` if a pose is invalid.
+    fn ask<R>(&self, level: Level, ask: impl FnOnce(MeshPairing<'_>) -> R) -> Option<R> {
+        let views = self.meshes.map(|placed| placed.mesh().arrays());
+        MeshPairing::new(self.meshes, views.each_ref(), &self.budget, level).map(ask)
+    }
+}
+
+/// The answer for an invalid pose.
+const INVALID: MeshAnswer = MeshAnswer {
+    verdict: MeshVerdict::Pose,
+    statistics: Statistics { evaluations: 0, node_pairs: 0, leaf_pairs: 0, neighbour_steps: 0 },
+};

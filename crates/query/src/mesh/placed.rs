@@ -1,0 +1,43 @@
+//! A prepared mesh at a pose in the world.
+
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::MeshHierarchy;
+
+/// A prepared mesh at a pose. Takes a few nanoseconds to make or copy.
+#[derive(Debug, Clone, Copy)]
+pub struct PlacedMesh<'a> {
+    mesh: &'a MeshHierarchy,
+    /// Maps the frame of the mesh's input to the world.
+    pose: Pose,
+    /// Maps the stored frame to the world.
+    placed: Pose,
+}
+
+impl<'a> PlacedMesh<'a> {
+    /// Places `mesh` at `pose`, which maps the frame of the mesh's input to the world.
+    #[inline]
+    #[must_use]
+    pub fn new(mesh: &'a MeshHierarchy, pose: &Pose) -> Self {
+        let frame = mesh.frame();
+        // Equals `pose.after(frame)`, as the pose of the frame has no rotation.
+        let placed = pose.with_scale(pose.scale() * frame.scale).with_translation(pose.apply(frame.origin));
+        Self { mesh, pose: *pose, placed }
+    }
+
+    /// The mesh.
+    #[must_use]
+    pub fn mesh(&self) -> &'a MeshHierarchy {
+        self.mesh
+    }
+
+    /// The pose of the mesh.
+    #[must_use]
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// The pose of the mesh's stored frame.
+    pub(crate) fn placed(&self) -> &Pose {
+        &self.placed
+    }
+}

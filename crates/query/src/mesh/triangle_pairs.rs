@@ -1,0 +1,81 @@
+//! The sixteen pairs of triangles of two leaves, in lanes.
+//!
+//! A filter in single precision: it rejects a pair only if all corners of one triangle are on one
+//! side of the other's plane, rounding included. The exact test decides about the other pairs.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use nearmiss_hierarchy::{Relative, TriangleBlock};
+use nearmiss_lanes::wide::{bits, product, repeated, spread};
+
+type Vector<S> = [f32x16<S>; 3];
+
+/// Returns the lanes of the triangle pairs that may meet, as bits. Lane 4j + i has triangle i of
+/// a's leaf and triangle j of b's.
+pub(crate) fn may_meet(level: Level, [a, b]: [&TriangleBlock; 2], relative: &Relative) -> u32 {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || may_meet_by(simd, [a, b], relative),
+    ))
+}
+
+#[inline(always)]
+fn may_meet_by<S: Simd>(simd: S, blocks: [&TriangleBlock; 2], relative: &Relative) -> u32 {
+    let [a, b] = in_lanes(simd, blocks, relative);
+    let slack = relative.slack();
+    let apart = is_beside(&a, &b, slack) | is_beside(&b, &a, slack);
+    !bits(apart) & 0xffff
+}
+
+/// Loads the corners of all sixteen pairs, in a's stored frame.
+#[inline(always)]
+pub(crate) fn in_lanes<S: Simd>(
+    simd: S,
+    [a, b]: [&TriangleBlock; 2],
+    relative: &Relative,
+) -> [[Vector<S>; 3]; 2] {
+    let ([p, q, r], [u, v, w]) = (a.load(simd), b.load(simd));
+    let (u, v, w) = (relative.points_of_four(u), relative.points_of_four(v), relative.points_of_four(w));
+    [[each_repeated(p), each_repeated(q), each_repeated(r)], [each_spread(u), each_spread(v), each_spread(w)]]
+}
+
+#[inline(always)]
+fn each_repeated<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vector<S> {
+    [repeated(x), repeated(y), repeated(z)]
+}
+
+#[inline(always)]
+fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vector<S> {
+    [spread(x), spread(y), spread(z)]
+}
+
+/// Returns the lanes in which all corners of `other` are on one side of the plane of `own`.
+///
+/// With the corners p, q, r of `own`, e = q − p, f = r − p, n = e × f and a corner x, the side is the
+/// sign of n·(x − p). Each coordinate is off by at most δ, the slack of the relative pose. Then e
+/// and f are off by 2δ, n by 4δ (|e| + |f| + 2δ), and the product by δ |n|₁ + 4δ (|e| + |f| + 2δ)
+/// |x − p|₁. The rounding of the operations adds less than one δ to each factor, because δ exceeds
+/// 4e-6 of all coordinates.
+#[inline(always)]
+fn is_beside<S: Simd>(own: &[Vector<S>; 3], other: &[Vector<S>; 3], slack: f32) -> mask32x16<S> {
+    let [p, q, r] = own;
+    let (e, f) = (sub(q, p), sub(r, p));
+    let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+    let [x, y, z] = [sub(&other[0], p), sub(&other[1], p), sub(&other[2], p)];
+    let [dx, dy, dz] = [product(n, x), product(n, y), product(n, z)];
+    let far = size(&x).max(size(&y)).max(size(&z));
+    let off = (size(&n) * 1.5 + (size(&e) + size(&f) + 2.0 * slack) * far * 6.0) * slack;
+    let (low, high) = (dx.min(dy).min(dz), dx.max(dy).max(dz));
+    low.simd_gt(off) | high.simd_lt(-off)
+}
+
+#[inline(always)]
+fn sub<S: Simd>(a: &Vector<S>, b: &Vector<S>) -> Vector<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The sum of the magnitudes of the coordinates.
+#[inline(always)]
+fn size<S: Simd>(v: &Vector<S>) -> f32x16<S> {
+    v[0].abs() + v[1].abs() + v[2].abs()
+}
