@@ -25,7 +25,7 @@ pub struct EvalArgs {
     /// Distances that define the surface; by default those that the scan was prepared for
     #[arg(long, value_enum)]
     pub kernel: Option<KernelName>,
-    /// Print one JSON object a point
+    /// Print one JSON object for each point
     #[arg(long)]
     pub json: bool,
     /// Check prepared scans in full before use: checksums, and every number
