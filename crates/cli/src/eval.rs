@@ -18,8 +18,8 @@ pub struct EvalArgs {
     /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Points to evaluate at: a line `x y z` each, in the frame of the scan; `-` reads standard
-    /// input
+    /// Points at which f is evaluated: a line `x y z` for each, in the frame of the scan; `-` reads
+    /// standard input
     #[arg(long, value_name = "FILE")]
     pub points: PathBuf,
     /// Distances that define the surface; by default those that the scan was prepared for

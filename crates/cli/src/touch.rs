@@ -92,7 +92,7 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// The number of shapes from which on an index pays off.
+/// The least number of shapes for which an index pays off.
 const MANY: u32 = 256;
 
 fn answer(placed: &Placed<'_>, shape: &Shape) -> (bool, Option<NearestPoint>, f64) {
