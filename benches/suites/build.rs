@@ -1,5 +1,6 @@
-//! Preparing a scan, on one thread and on all; beside it kiddo's kd-tree of the points and parry's hierarchy
-//! of the mesh, which do less: neither has normals, radii or discs, and the mesh had to be made first.
+//! Preparing a scan, on one thread and on all. The rivals are kiddo's kd-tree of the points and
+//! parry's hierarchy of the mesh. They do less: neither has normals, radii or discs, and the mesh
+//! had to be made first.
 
 use std::time::Duration;
 
@@ -9,7 +10,7 @@ use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::kiddo::PointScan;
 use nearmiss_benches::rivals::parry::MeshTree;
 
-/// The large one takes seconds a run on one thread; criterion needs ten.
+/// The large one takes seconds per run on one thread, and criterion needs ten runs.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn measure(criterion: &mut Criterion, object: &Object) {

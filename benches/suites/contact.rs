@@ -1,4 +1,4 @@
-//! Poses within 10 r of first touch, half of them apart: where queries are dear.
+//! Poses within 10 r of first touch, half of them apart. Queries take longest there.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nearmiss::Pose;

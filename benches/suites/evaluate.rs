@@ -1,5 +1,5 @@
-//! The implicit function near the surface, with both kernels; beside it the nearest point by kiddo, which is
-//! the least that a method without a surface pays at the same places.
+//! The implicit function near the surface, with both kernels. The rival is kiddo's search for the
+//! nearest point at the same places, which a method without a surface needs at least.
 
 use std::hint::black_box;
 use std::num::NonZero;

@@ -1,5 +1,5 @@
-//! Opening a prepared scan of a million points; beside it reading the file, and building kiddo's kd-tree
-//! anew, which is what a user of a library without files does at every start.
+//! Opening a prepared scan of a million points. It is compared with reading the file, and with
+//! building kiddo's kd-tree, which a user of a library without files does at every start.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nearmiss::{BuildOptions, Check, Scan};

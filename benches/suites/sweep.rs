@@ -1,14 +1,15 @@
 //! The sweep, all distances in equal parts: the mean of an iteration is the sweep mean.
 //!
-//! The distribution by distance is `bench sweep`'s to tell; this suite is for comparing commits.
+//! This suite is for comparing commits. `bench sweep` shows the distribution by distance.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nearmiss::Pose;
 use nearmiss_benches::object::{Object, from_folder};
 use nearmiss_benches::{poses, rivals::bench};
 
-/// Poses of each distance, drawn beforehand. Together more than any sample of the slower methods asks, so
-/// that none is asked twice within a sample; the fastest come round after 26,000.
+/// Poses for each distance, drawn beforehand. Slower methods take fewer iterations per sample than
+/// there are poses, so no pose is queried twice within a sample. The fastest ones start again after
+/// 26,000.
 const PER_DISTANCE: usize = 2000;
 
 /// Distances in turn.

@@ -1,5 +1,5 @@
-//! Two triangles: the exact test beside the rounded one of the hand-written traversal and parry's,
-//! contacts, distances.
+//! Two triangles: the exact test, compared with the rounded test of the hand-written traversal and
+//! with parry's; contacts; distances.
 
 use std::hint::black_box;
 

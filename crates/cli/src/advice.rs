@@ -6,7 +6,7 @@ use crate::digits::{percent, rough, short, short_up};
 use crate::health::Health;
 use crate::report::median;
 
-/// Shares of the points from which on advice is given.
+/// Least shares of the points for which advice is given.
 const MANY_ON_LINES: f64 = 0.1;
 const MANY_SPARSE: f64 = 0.05;
 const MANY_OUTLIERS: f64 = 0.001;
@@ -179,9 +179,9 @@ fn thickened(radius: f64) -> String {
     format!("--thickened {}", short_up(0.5 * radius))
 }
 
-/// Returns the option for more neighbours, if that helps against lines. In a scan with surfaces,
-/// lines are mostly rings jagged by noise, whose first few neighbours spread by chance. A scan of
-/// little but lines was already searched up to 256 neighbours.
+/// Returns the option for more neighbours, if that helps against lines. It does in a scan with
+/// surfaces, where noise makes the first few neighbours on a ring spread to both sides by chance.
+/// In a scan of little but lines, up to 256 neighbours were searched already.
 fn wider_along_lines(scan: &PointHierarchy) -> Option<String> {
     (scan.share(PointKind::Line) < scan.usable()).then(|| more_neighbours(scan.radius_neighbours())).flatten()
 }

@@ -204,7 +204,8 @@ impl Canvas {
         });
     }
 
-    /// Draws the parts of a line that nothing hides by more than `lift`, a length in the world.
+    /// Draws the visible parts of a line. Something hides a part only if it is nearer to the viewer
+    /// by more than `lift`, a length in the world.
     pub(crate) fn edge(
         &mut self,
         camera: &Camera,

@@ -51,7 +51,7 @@ pub struct ClashArgs {
     /// Write the list as one HTML file, with pictures
     #[arg(long, value_name = "OUT.html")]
     pub html: Option<PathBuf>,
-    /// Show at most this many clashes of the list from near on the page
+    /// Number of clashes that get a close-up on the page, at most
     #[arg(long, value_name = "N", requires = "html", default_value_t = 50)]
     pub pictures: usize,
     /// Threads to prepare raw inputs; 0 for all cores

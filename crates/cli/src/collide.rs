@@ -57,12 +57,12 @@ pub struct CollideArgs {
     pub margin: f64,
     /// Evidence required of a separation
     ///
-    /// A certified separation is proven; trying for one takes half as much time again, near
-    /// contact two to three times as much. The default is certified, with the geodesic kernel
-    /// estimated.
+    /// A certified separation is proven. The proof adds half to the time of a query on average, and
+    /// near contact a query takes two to three times as long. The default is certified, but
+    /// estimated with the geodesic kernel.
     #[arg(long, value_enum, help_heading = "Budget and evidence")]
     pub evidence: Option<EvidenceName>,
-    /// Write the proof of certified answers, for an independent check: one line of JSON a query
+    /// Write the proof of each certified answer as a line of JSON, for an independent check
     #[arg(long, value_name = "FILE", conflicts_with = "thickened", help_heading = "Output")]
     pub prove: Option<PathBuf>,
     /// Time limit for each query, such as 200us
@@ -76,13 +76,13 @@ pub struct CollideArgs {
     /// A unit is one evaluation of f or one node pair; 500 to 10000 is common.
     #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
     pub work: Option<u64>,
-    /// Detail to find of a contact
+    /// Level of detail of a contact
     #[arg(long, value_enum, default_value_t = DetailName::Witness)]
     pub detail: DetailName,
     /// Find all contacts, not one
     ///
-    /// There is one for each pair of leaves that touch or, with --flat, for each bracket, to
-    /// first order.
+    /// One contact is reported for each pair of leaves that touch, or with --flat for each bracket.
+    /// Contacts are accurate to first order.
     #[arg(long)]
     pub all: bool,
     /// The treatment of the contacts
@@ -103,7 +103,7 @@ pub struct CollideArgs {
     /// From where the picture is taken
     #[command(flatten)]
     pub view: ViewArgs,
-    /// Print one JSON object a query
+    /// Print one JSON object for each query
     #[arg(long, help_heading = "Output")]
     pub json: bool,
     /// Show no progress

@@ -33,7 +33,7 @@ pub struct DensityArgs {
     /// Largest share of wrong verdicts
     #[arg(long, value_name = "RATE", default_value_t = 0.001, value_parser = parse_rate)]
     pub error: f64,
-    /// Number of surfels for the derived number of points
+    /// Number of surfels from which the number of points is derived, next to the measured one
     #[arg(long, value_name = "A", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub surfels: u32,
     /// Poses at each of the 13 distances of the sweep

@@ -47,8 +47,8 @@ pub struct DistanceArgs {
     /// Stop when the bounds differ by at most this share of the upper one: from 0 to less than
     /// 1
     ///
-    /// Within about the local spacing of contact, the bounds may stay further apart. Applies to
-    /// obstacles only.
+    /// If the scans are nearer to each other than about the local spacing, the bounds may stay
+    /// further apart. Has no effect with --surface-only and --thickened.
     #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative, help_heading = "Budget and evidence")]
     pub relative: f64,
     /// Time limit for each query, such as 200us
@@ -71,7 +71,7 @@ pub struct DistanceArgs {
     /// From where the picture is taken
     #[command(flatten)]
     pub view: ViewArgs,
-    /// Print one JSON object a query
+    /// Print one JSON object for each query
     #[arg(long, help_heading = "Output")]
     pub json: bool,
     /// Show no progress

@@ -69,7 +69,7 @@ impl Preparation {
         BASE + self.cost().bytes * points
     }
 
-    /// Returns cheaper products, each with the remedy that leads to it.
+    /// Returns cheaper products, each with advice on how to get it.
     fn lighter(self) -> &'static [(Self, &'static str)] {
         match self {
             Self::ClosePairs => &[(Self::Graph, "leave out --close-pairs"), (Self::Hierarchy, NO_GRAPH)],
@@ -79,7 +79,7 @@ impl Preparation {
     }
 }
 
-/// The remedy that leads to the cheapest product.
+/// The advice that leads to the cheapest product.
 const NO_GRAPH: &str = "leave out the graph";
 
 /// Refuses points that cannot be prepared in memory, and announces long runs.

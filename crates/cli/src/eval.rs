@@ -18,14 +18,14 @@ pub struct EvalArgs {
     /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Points to evaluate at: a line `x y z` each, in the frame of the scan; `-` reads standard
-    /// input
+    /// Points at which f is evaluated: a line `x y z` for each, in the frame of the scan; `-` reads
+    /// standard input
     #[arg(long, value_name = "FILE")]
     pub points: PathBuf,
     /// Distances that define the surface; by default those that the scan was prepared for
     #[arg(long, value_enum)]
     pub kernel: Option<KernelName>,
-    /// Print one JSON object a point
+    /// Print one JSON object for each point
     #[arg(long)]
     pub json: bool,
     /// Check prepared scans in full before use: checksums, and every number

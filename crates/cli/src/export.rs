@@ -27,8 +27,8 @@ pub struct ExportArgs {
     pub file: PathBuf,
     /// Points with normals and kinds, as PLY
     ///
-    /// In the order of the prepared file. `source` is the index in the input. `kind` is a
-    /// number with a colour: 0 sheet, grey; 1 edge, blue; 2 noisy, yellow; 3 line, green; 4
+    /// The points are in the order of the prepared file. `source` is the index in the input. `kind`
+    /// is a number with a colour: 0 sheet, grey; 1 edge, blue; 2 noisy, yellow; 3 line, green; 4
     /// stray, red; 5 sparse, pink.
     #[arg(long, value_name = "P.ply")]
     pub points: Option<PathBuf>,

@@ -4,10 +4,11 @@ use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont, point};
 
-/// Height of a capital letter, in letter sizes.
+/// Height of a capital letter, as a multiple of the letter size.
 pub(crate) const CAPITAL: usize = 7;
 
-/// Height of a line of letters, in letter sizes, from the top of capitals to the lowest descender.
+/// Height of a line of letters from the top of capitals to the lowest descender, as a multiple of
+/// the letter size.
 pub(crate) const LINE: usize = 9;
 
 /// Widening of the strokes, as a share of the letter size. The face is light, and pictures are
@@ -55,7 +56,8 @@ impl Face {
 
 /// Calls `paint` with column, row and coverage (0 to 1) of each pixel that a line of letters
 /// covers; some pixels are visited more than once. Columns count from the left end of the first
-/// letter, rows from the top of capital letters. Accents and overhangs have negative ones.
+/// letter, rows from the top of capital letters. Pixels of accents have negative rows, and those of
+/// overhangs negative columns.
 pub(crate) fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32)) {
     let Some(face) = &*FACE else { return };
     let scale = face.scale(size);

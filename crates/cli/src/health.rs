@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Points whose spacing exceeds the median spacing by this factor are sparse.
 const UNEVEN: f64 = 4.0;
 
-/// Sparse points are reported from this share of all points on, or from this share of the area.
+/// Sparse points are reported if they have at least this share of all points, or of the area.
 const MANY: f64 = 0.02;
 const LARGE: f64 = 0.1;
 

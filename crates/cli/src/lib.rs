@@ -141,7 +141,7 @@ of the bounding boxes, in the units of the files. offset is the shift along the 
 contact: positive apart, negative further in.";
 
 const TOUCH_EXAMPLE: &str = "\
-Example, with a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} a shape in robot.jsonl:
+Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} for each shape:
   nearmiss touch room.nm --shapes robot.jsonl --json";
 
 /// The commands, each with its options. `xtask` flattens them into its own.
@@ -159,7 +159,7 @@ pub enum Command {
     Inspect(InspectArgs),
     /// Evaluate the implicit surface of a scan at given points
     #[command(
-        after_long_help = "Example, with a line x y z a point in at.txt:\n  nearmiss eval dragon.nm --points at.txt"
+        after_long_help = "Example; a line of at.txt is a point x y z:\n  nearmiss eval dragon.nm --points at.txt"
     )]
     Eval(EvalArgs),
     /// Test whether two scans touch, where, and how near they come

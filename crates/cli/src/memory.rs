@@ -10,10 +10,10 @@ use clap::Args;
 pub struct MemoryArgs {
     /// Memory limit, such as 500MB or 16GB
     ///
-    /// By default the available memory, where it is known, and 4 GiB for slice maps. A command
-    /// that needs more is refused before it starts. With this option, `slices build`, and
-    /// `preprocess` without a graph and with filters of single points, work on disk instead,
-    /// beside the output.
+    /// By default, the limit is the memory that the system has left, and 4 GiB for `slices build`.
+    /// A command that needs more is refused before it starts. With this option, two commands work
+    /// on disk instead, beside the output: `slices build`, and `preprocess` of points without a
+    /// graph and without filters other than --crop and --class.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub memory: Option<u64>,
 }

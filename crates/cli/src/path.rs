@@ -22,7 +22,9 @@ pub struct PathArgs {
     /// line of output, in order; a summary follows.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Write a table: of --poses line, time, verdict, clearance, place; of --all its contacts
+    /// Write a table: with --poses a row for each pose, with --all a row for each contact
+    ///
+    /// A row for a pose has its line, time, verdict, evidence, clearance and place, among others.
     #[arg(long, value_name = "OUT.csv", help_heading = "Output")]
     pub csv: Option<PathBuf>,
     /// Plot clearance and verdict over --poses, as SVG

@@ -53,7 +53,7 @@ struct GraphReport {
     oriented: f64,
 }
 
-/// The confidence from which on the orientation of a normal counts as certain.
+/// The least confidence with which the orientation of a normal counts as certain.
 const CERTAIN: u8 = 128;
 
 impl GraphReport {

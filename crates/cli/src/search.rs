@@ -45,14 +45,15 @@ pub struct SearchArgs {
     /// Seed of random points
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Research", hide_short_help = true)]
     pub seed: u64,
-    /// Node pairs to visit first; by default depth first, with a budget by overlap
+    /// Order in which node pairs are visited; by default `depth`, or `overlap` with a budget
     #[arg(long, value_enum, help_heading = "Research", hide_short_help = true)]
     pub order: Option<OrderName>,
     /// Prune nodes by their sphere coverings where their boxes overlap
     #[arg(long, help_heading = "Research", hide_short_help = true)]
     pub coverings: bool,
-    /// Stop at nodes of this size, in world units, and let their samples answer
+    /// Finest resolution, in world units
     ///
+    /// Nodes whose samples cover their surface within this length are compared by these samples.
     /// The answer is then estimated.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true, value_parser = parse_radius, help_heading = "Budget and evidence")]
     pub resolution: Option<f64>,
@@ -72,9 +73,10 @@ pub enum MethodName {
 /// The names of the sources of the second end of a bracket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BracketsName {
-    /// The nearest of the drawn points
+    /// The nearest drawn point on the other side
     Drawn,
-    /// The map of close pairs, as far as it reaches (Klein & Zachmann 2005, section 4.3)
+    /// Points about two surfel radii away in the map of close pairs (Klein & Zachmann 2005, section
+    /// 4.3); beyond the map, the drawn points
     Annulus,
 }
 

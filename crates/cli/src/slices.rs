@@ -37,11 +37,11 @@ Examples:
   nearmiss slices build atrium.obj -o atrium.slices --resolution 700 --up y --max-slope 35";
 
 const QUERY_EXAMPLES: &str = "\
-Example, with a line {\"min\":[x,y,z],\"max\":[x,y,z]} a box in boxes.jsonl:
+Example; boxes.jsonl has a line {\"min\":[x,y,z],\"max\":[x,y,z]} for each box:
   nearmiss slices query building.slices --boxes boxes.jsonl --json";
 
 const WALK_EXAMPLES: &str = "\
-Example, with {\"start\":[x,y,z],\"points\":[[x,y],…]} in route.json:
+Example; route.json contains {\"start\":[x,y,z],\"points\":[[x,y],…]}:
   nearmiss slices walk building.slices --route route.json --image walk.png --trace walk.csv";
 
 const START_EXAMPLES: &str = "\

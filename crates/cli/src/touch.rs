@@ -21,7 +21,7 @@ use crate::preprocess::parse_threads;
 pub struct TouchArgs {
     /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     pub scan: PathBuf,
-    /// Shapes, one JSON object a line, in world units; `-` reads standard input
+    /// Shapes in world units, one JSON object on each line; `-` reads standard input
     ///
     /// `{"sphere":{"centre":[x,y,z],"radius":r}}`,
     /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}` or `{"box":{"pose":[16
@@ -37,7 +37,7 @@ pub struct TouchArgs {
     /// Check prepared scans in full before use: checksums, and every number
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
-    /// Print one JSON object a shape
+    /// Print one JSON object for each shape
     #[arg(long, help_heading = "Output")]
     pub json: bool,
     /// Show no progress
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// The number of shapes from which on an index pays off.
+/// The least number of shapes for which an index pays off.
 const MANY: u32 = 256;
 
 fn answer(placed: &Placed<'_>, shape: &Shape) -> (bool, Option<NearestPoint>, f64) {

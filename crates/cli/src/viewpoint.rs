@@ -15,8 +15,8 @@ use crate::canvas::{Area, Camera};
 pub struct ViewArgs {
     /// Axis that points up in the picture: x, y, z, -x, -y or -z
     ///
-    /// By default z where the larger scan has level floors and is not highest along z, as rooms,
-    /// buildings and streets are; otherwise the longest extent lies level.
+    /// The default is z if the scan, or the larger of two, has level floors and is wider than high
+    /// along z, as rooms, buildings and streets are. Otherwise the longest extent is drawn level.
     #[arg(
         long,
         value_name = "AXIS",
@@ -27,9 +27,9 @@ pub struct ViewArgs {
     pub up: Option<Up>,
     /// Direction from which the picture is taken, in degrees
     ///
-    /// The azimuth is counted anticlockwise as seen from above. With --up z, the default here, 0
-    /// looks from +x and 90 from +y; with --up y from +z and +x; with --up x from +y and +z.
-    /// Elevation 0 looks from the side, 90 from above.
+    /// With this option, the default of --up is z. The azimuth is counted anticlockwise as seen
+    /// from above. The viewer is at +x for azimuth 0 and at +y for 90; with --up y at +z and +x;
+    /// with --up x at +y and +z. Elevation 0 is a view from the side, 90 from above.
     #[arg(
         long,
         value_name = "AZIMUTH,ELEVATION",

@@ -8,8 +8,8 @@
 //!
 //! Klein & Zachmann 2005, §6, state O(log³ N) for an update. Here the number of points that an
 //! update touches does not grow with N where density is bounded: each point is among the r nearest
-//! of O(r) others, and has as many neighbours. Each touched point costs a search in an R*-tree
-//! ("The R*-tree: an efficient and robust access method for points and rectangles", Beckmann et al.
+//! of O(r) others, and has O(r) neighbours. Each touched point costs a search in an R*-tree ("The
+//! R*-tree: an efficient and robust access method for points and rectangles", Beckmann et al.
 //! 1990).
 
 use nearmiss_lanes::vector::distance_sq;

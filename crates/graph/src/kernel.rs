@@ -4,15 +4,15 @@
 //! "Proximity graphs for defining surfaces over point clouds" (2004). The foot is the nearest point
 //! to x on the edges of p1, the point nearest to x. Distances from the foot are interpolated
 //! between the distances from the two ends of its edge. They are therefore continuous where the
-//! nearest point changes. They do not grow with the height of x above the cloud; the domain of f
-//! ends the surface there (`nearmiss_surface::Status`).
+//! nearest point changes. They do not grow with the height of x above the cloud. So the surface
+//! does not end because of them; the domain of f ends it (`nearmiss_surface::Status`).
 //!
 //! Two things differ from the papers. The distances from the foot to both ends are not added before
 //! interpolating. If they were, a foot halfway between two points would be a whole edge away from
-//! either, and half an edge too far from all other points. And where only one end is within the
-//! support radius of a point, the distance of the other end is extended along the edge instead of
-//! being infinite. Otherwise points with weights up to a tenth would drop out as soon as x leaves
-//! p1.
+//! either, and half an edge too far from all other points. The other difference concerns a point
+//! whose support radius contains only one end. Its distance to the other end is not taken as
+//! infinite, but as the distance to the contained end plus the length of the edge. Otherwise points
+//! with weights up to a tenth would drop out as soon as x leaves p1.
 
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, SurfacePlan};

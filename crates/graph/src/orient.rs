@@ -1,8 +1,8 @@
 //! Orientation of normals: one sign for each normal, so that neighbours agree and normals point
 //! outwards.
 //!
-//! As in Hoppe et al. 1992, a spanning tree of the edges along which normals agree best propagates
-//! the sign from point to point. Two things differ.
+//! As in Hoppe et al. 1992, the sign spreads from point to point along a spanning tree. The tree
+//! consists of the edges whose two normals agree best. Two things differ.
 //!
 //! Hoppe et al. measure agreement by how parallel two normals are, which fails at sharp edges and
 //! across thin plates. Here two normals agree if they mirror each other in the plane halfway
@@ -11,9 +11,10 @@
 //! n − 2 (n·e) e.
 //!
 //! In their tree a single edge decides between two sides of an ambiguous region. Here the tree
-//! grows edge by edge (Kruskal's algorithm) only along smooth sheets, which yields patches. Patches
-//! are joined by the votes of all edges between two of them, each patch to the one with the
-//! clearest votes, until no edge is left. `benches` (`geodesics`) counts wrong signs.
+//! grows edge by edge (Kruskal's algorithm) only along smooth sheets, which yields patches. Then
+//! patches are joined. Every edge between two patches votes on whether their signs match, and each
+//! patch joins the neighbour with the clearest vote, until no edge is left. `benches` (`geodesics`)
+//! counts wrong signs.
 
 mod agreement;
 mod outwards;
@@ -29,16 +30,16 @@ use outwards::outwards;
 use patches::{Signed, Tree, Votes};
 pub use sides::{Decision, OrientedPart, Sides, Viewpoint};
 
-/// Least agreement of normals on one smooth sheet. If the normal is reversed along a cycle of such
-/// edges, the sheet is one-sided.
+/// Least agreement of normals on one smooth sheet. If a cycle of such edges reverses the normal,
+/// the sheet is one-sided.
 const SMOOTH: f32 = 0.95;
 
 /// Result of [`orient()`]: confidences and parts. The normals are changed in place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Orientation {
     /// Confidence in the sign of each point's normal: 255 for certain, 0 for arbitrary. It is the
-    /// lesser of two measures: the net agreement along the point's edges, and the certainty of the
-    /// least certain step through which the point got its sign.
+    /// lesser of two measures. One is the net agreement along the point's edges. The other is the
+    /// least certainty among the steps by which the sign reached the point.
     pub confidence: Vec<u8>,
     /// Connected parts, by their first points.
     pub parts: Vec<OrientedPart>,
@@ -48,16 +49,16 @@ pub struct Orientation {
 /// known.
 ///
 /// The side of a component is the one that `sides` suggests for most of its points. If `sides`
-/// suggests nothing, the component is oriented to enclose a positive volume about its centre, where
-/// each point stands for an area of the square of its local sampling radius. The initial signs only
-/// matter if none of this decides.
+/// suggests nothing, normals point away from the volume that the component encloses. The volume is
+/// a sum of cones from the centre of the component to its points, each with a base of area r² for a
+/// local sampling radius r. The initial signs only matter if none of this decides.
 ///
 /// Takes O(e log e) time for e edges, of which only ambiguous ones are sorted. Some of it runs on
 /// all cores; the result does not depend on their number.
 ///
 /// # Panics
-/// Panics if the numbers of positions, normals and radii, and of normals in `sides` if any, differ
-/// from the number of points.
+/// Panics if the number of positions, normals, radii or, if given, normals in `sides` differs from
+/// the number of points.
 pub fn orient(
     graph: &Adjacency,
     positions: &[[f32; 3]],

@@ -53,8 +53,8 @@ impl ClosePairs {
     ///
     /// With either `check` the structure of the lists is validated, so that no method fails
     /// afterwards. [`Check::Full`] also validates the contents: a list names existing points in
-    /// ascending distance, begins with the point itself, and ends within the support radii. Pairs
-    /// stored separately must belong to entries that cannot hold them.
+    /// ascending distance, begins with the point itself, and ends within the support radii. Only
+    /// pairs that do not fit into the entries of the list may be stored separately.
     ///
     /// # Errors
     /// Fails if a section is missing, holds values that no build writes, or contradicts another
@@ -151,9 +151,9 @@ impl Levels {
 
     /// Loads the levels over `points` points from `file` without copying arrays.
     ///
-    /// With either `check`, all indices are in range, every path inwards ends at the centre of its
-    /// cell, and edges cross between the cells that they join, so that no search fails.
-    /// [`Check::Full`] also validates the distances.
+    /// With either `check`, validates what searches rely on: all indices are in range, every path
+    /// inwards ends at the centre of its cell, and every edge leads from one of its cells to the
+    /// other. [`Check::Full`] also validates the distances.
     ///
     /// # Errors
     /// Fails if a section is missing, holds values that no build writes, or contradicts another

@@ -53,7 +53,7 @@ impl PointGraph {
     ///
     /// With either `check` the structure is validated in one pass: lengths agree, and all indices
     /// are in range, so that no method fails afterwards. [`Check::Full`] also checks that each edge
-    /// is stored at both ends, and that numbers are such as a build writes.
+    /// is stored at both ends, and that a build could have written every number.
     ///
     /// # Errors
     /// Fails if a section is missing, holds values that no build writes, or contradicts another

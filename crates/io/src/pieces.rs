@@ -90,7 +90,7 @@ pub fn read_in_pieces(
         Format::Obj | Format::Las | Format::E57 | Format::Stl | Format::Off | Format::Gltf => None,
     };
     let points = |source| Pieces::Points(PointPieces { path: path.into(), source });
-    // A header that fills the whole head may continue behind it.
+    // A header that fills the whole head may continue after it.
     if let Some(mut layout) = layout.filter(|layout| mark + layout.start < head.len()) {
         layout.start += mark;
         layout.check_length(length).map_err(|broken| broken.of(path))?;

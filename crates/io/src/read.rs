@@ -25,9 +25,9 @@ use crate::{las, npy, obj, off, pcd, ply, stl, xyz};
 ///
 /// Without a `format`, the format is recognised by the content, then by the name. LAS, LAZ and E57
 /// are read in blocks; other files are in memory as a whole while they are read. Further
-/// allocations are bounded by the length of the file, not by counts in its header: some tens of
-/// bytes for each byte of the file, and for compressed data 128 bytes each beyond the first 128
-/// MiB.
+/// allocations are bounded by the length of the file, not by counts in its header. They are some
+/// tens of bytes for each byte of the file. Compressed data may take 128 bytes for each byte, plus
+/// 128 MiB.
 ///
 /// # Errors
 /// Fails if the file cannot be read or is invalid. The error names the file, the fault and its
@@ -122,7 +122,7 @@ pub(crate) struct Start {
 const HEAD: u64 = 1 << 16;
 
 impl Start {
-    /// Reads the start of a file, and leaves the file positioned behind it.
+    /// Reads the start of a file, and leaves the file positioned after it.
     pub(crate) fn of(file: &mut File, format: Option<Format>, path: &Path) -> Result<Self, ReadError> {
         let failed = |cause| ReadError::Io { path: path.into(), cause };
         let length = file.metadata().map_err(failed)?.len();

@@ -31,8 +31,8 @@ pub struct TriangleContact {
 /// lies. This holds for nearly parallel planes too. For finite corners the result is finite.
 ///
 /// # Cost
-/// About 1.5 µs for a pair that meets, as [`triangles_meet`](crate::triangles_meet) for one that
-/// does not.
+/// Takes about 1.5 µs for a pair that meets. For any other pair it takes as long as
+/// [`triangles_meet`](crate::triangles_meet).
 #[must_use]
 pub fn triangle_contact(a: &Corners, b: &Corners) -> Option<TriangleContact> {
     let (point, ends, flat) = match arrangement(a, b) {

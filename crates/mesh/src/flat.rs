@@ -131,8 +131,8 @@ fn visit_common(a: &Corners, b: &Corners, each: &mut impl FnMut([f64; 3]) -> boo
     Projection::new(&large, &small, axis.unwrap_or(0)).visit(each);
 }
 
-/// Returns `true` if a segment that does not lie in the plane of the triangle, but has no two ends
-/// strictly on one side of it, meets the triangle.
+/// Returns `true` if a segment meets the triangle. The segment must not lie in the plane of the
+/// triangle, and its ends must not both be strictly on one side of that plane.
 fn pierces(triangle: &Hull, segment: &Hull) -> bool {
     let [from, to, _] = segment.corners;
     let [a, b, c] = triangle.corners;

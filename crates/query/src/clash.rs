@@ -194,8 +194,8 @@ impl Pair<'_> {
     /// Lists every place where the scans meet or, with a clearance, come nearer than it.
     ///
     /// Costs two searches for [all contacts](Self::contacts), and n log n steps to group n
-    /// contacts. The search within a great clearance takes the longer of both. Each search may
-    /// spend the whole budget. Allocates. Deterministic unless the budget has a deadline.
+    /// contacts. If the clearance is large, the second search takes most of the time. Each search
+    /// may spend the whole budget. Allocates. Deterministic unless the budget has a deadline.
     #[must_use]
     pub fn clashes(&self, plan: &ClashPlan, scratch: &mut Scratch) -> Clashes {
         let views = self.scans().each_ref();

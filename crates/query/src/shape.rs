@@ -251,8 +251,8 @@ struct Search<'a> {
     skeleton: &'a Skeleton,
     /// `true` if any point within reach will do.
     any: bool,
-    /// Excess of a relevant box's distance from the centre of the ball over its distance from the
-    /// skeleton.
+    /// The greatest difference of a relevant box's distance from the centre of the ball and its
+    /// distance from the skeleton.
     beyond: f64,
     /// The least squared distance so far and its point. Starts with the squared reach.
     best: (f64, usize),

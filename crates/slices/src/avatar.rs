@@ -15,10 +15,11 @@ pub struct AvatarOptions {
     /// Height of the box. Default: 1.6. On stairs a box stands on the highest step under it, a
     /// quarter of a metre higher than a person would, so the box is lower than a person.
     pub height: f64,
-    /// Height that it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
+    /// The greatest height that it steps up at once, and the height that it falls in one step.
+    /// Default: 0.35, two steps of a staircase.
     pub climb: f64,
-    /// Distance that it moves in a step. Limited to the lesser side of its base, so that the bases
-    /// at both ends meet and it steps over nothing. Default: 0.05.
+    /// Distance that it moves in a step. It is limited to the lesser side of the base. So the bases
+    /// before and after a step touch, and the avatar cannot pass over an obstacle. Default: 0.05.
     pub step: f64,
 }
 

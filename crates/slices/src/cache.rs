@@ -190,8 +190,8 @@ impl SliceCache {
         self.map.put(slice, Some(known.unwrap_or_else(|| Arc::new(image))));
     }
 
-    /// Evicts the slice furthest from the middle of those wanted if the cache is full, but none in
-    /// `spared`. Returns `true` if there is a free place.
+    /// If the cache is full, evicts the slice that is furthest from the middle of the wanted slices
+    /// and not in `spared`. Returns `true` if there is a free place.
     fn make_room(&mut self, wanted: &RangeInclusive<u32>, spared: &RangeInclusive<u32>) -> bool {
         if self.kept.len() < self.capacity {
             return true;
@@ -208,8 +208,8 @@ impl SliceCache {
         furthest.is_some()
     }
 
-    /// Requests slices beyond those wanted, on the side that the avatar moves to. They get half of
-    /// the free places, since the avatar may turn round.
+    /// Requests slices beyond the wanted ones, on the side that the avatar moves to. They get half
+    /// of the free places, since the avatar may turn round.
     fn ask_ahead(&mut self, slices: &RangeInclusive<u32>, feet: f64) {
         let before = *self.feet.get_or_insert(feet);
         // The unevenness of a floor does not count as movement.

@@ -29,8 +29,8 @@ const LEAST: u64 = 100;
 /// there are many thin layers.
 const RUNS: usize = 256;
 
-/// Returns the greatest number of levels that a floor may span, for ε. The small addition keeps
-/// rounding of a tangent from deciding.
+/// Returns the greatest number of levels that a floor may span, for ε. A small number is added
+/// first, so that the rounding error of a tangent makes no difference.
 pub(crate) fn most_levels(share: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
     let most = (share * f64::from(LEVELS) + 1e-6).floor().min(f64::from(2 * LEVELS)) as i32;

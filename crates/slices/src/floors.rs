@@ -16,12 +16,12 @@ pub struct Storey {
     pub height: f64,
     /// Area of its floor with headroom, in square units of the input.
     pub area: f64,
-    /// Heights of feet that belong to it, in the map's coordinates; half open. The ranges of all
-    /// storeys cover every height. Stairs belong to the storey below them.
+    /// Range of the heights of feet that belong to it, in the map's coordinates, without the upper
+    /// end. The ranges of all storeys cover every height. Stairs belong to the storey below them.
     pub heights: [f64; 2],
 }
 
-/// Steps that a climb is divided into.
+/// Number of bins in the height of a climb.
 const FINE: f64 = 16.0;
 
 /// The greatest number of bins of height.
@@ -30,18 +30,19 @@ const MOST_BINS: f64 = 4_194_304.0;
 /// A storey has at least this share of the area of the largest one.
 const LEAST_SHARE: f64 = 0.1;
 
-/// A level above the lowest is a storey if the things that rise from it cover at least this share
-/// of it, per slice. Nothing rises from a roof, or from a ceiling that was scanned from below.
+/// A level above the lowest is a storey only if things rise from it. They must cover at least this
+/// share of its area, on average over the slices between a climb and the headroom above it. Nothing
+/// rises from a roof, or from a ceiling that was scanned from below.
 const LEAST_ABOVE: f64 = 0.001;
 
 impl SliceMap {
     /// Finds the storeys, lowest first, with the headroom that the avatar's height needs.
     ///
     /// A pixel is floor if it is no obstacle and has nothing above it up to the height of the
-    /// avatar. The height with the most floor within one climb is a storey. So is, in turn, the
-    /// next one that is at least the avatar's height away from all others and has at least a tenth
-    /// of the area of the largest. Levels from which nothing rises are roofs, not storeys. Visits
-    /// every pixel of every slice once.
+    /// avatar. The storeys are found one by one, the largest first. Each is the height range of one
+    /// climb with the most floor, at least the avatar's height away from the storeys found before.
+    /// The search ends below a tenth of the largest area. Levels from which nothing rises are
+    /// roofs, not storeys. Visits every pixel of every slice once.
     ///
     /// # Errors
     /// If a slice is not loaded.
@@ -153,12 +154,12 @@ impl FloorCount {
         storeys
     }
 
-    /// Returns the existing bins around one.
+    /// Returns the bins from `half` below `middle` to `half` above it, as far as they exist.
     fn about(&self, middle: usize, half: usize) -> Range<usize> {
         middle.saturating_sub(half)..(middle + half + 1).min(self.bins.len())
     }
 
-    /// Returns `true` if something rises from a storey, from a climb to the headroom above it.
+    /// Returns `true` if there are things on a storey, between a climb and the headroom above it.
     fn rises_from(&self, storey: &Storey) -> bool {
         let heights = [storey.height + self.climb, storey.height + self.headroom];
         let Some(slices) = self.grid.range(2, heights) else { return false };

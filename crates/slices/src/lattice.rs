@@ -9,9 +9,9 @@ const TOLERANCE: f64 = 0.01;
 /// Equidistant places along both horizontal axes, as far as a base there meets the map.
 ///
 /// A base of side `b` over pixels of side `t` covers `⌊b/t⌋ + 1` of them along an axis or one more,
-/// depending on its position. The places are the centres of blocks of the lesser number. So an
-/// avatar passes every gap that it can pass at all, provided that the spacing is a pixel or a whole
-/// part of it. The places depend on the map and the avatar alone.
+/// depending on its position. The places are the centres of blocks with the lesser number of
+/// pixels. So an avatar passes every gap that it can pass at all, provided that the spacing is a
+/// pixel or a whole part of it. The places depend on the map and the avatar alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepGrid {
     /// The place of column 0 and row 0, in the map's horizontal coordinates.

@@ -34,8 +34,8 @@ pub struct About {
     pub rule: Obstacle,
     /// ε: a voxel whose points span more than ε σ is an obstacle.
     pub share: f64,
-    /// Height that the points of a level floor spread over within a pixel, as far as ε allows for
-    /// it. Given or estimated; 0 if it could not be estimated, or if ε was given directly.
+    /// Noise: the height that the points of a level floor span within a pixel, limited to what ε
+    /// allows for. Given or estimated; 0 if it could not be estimated, or if ε was given directly.
     pub noise: f64,
     /// The number of points.
     pub points: u64,

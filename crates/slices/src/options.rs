@@ -56,9 +56,9 @@ pub enum Obstacle {
     Slope {
         /// θ, above 0 and below 90 degrees.
         degrees: f64,
-        /// Height that the points of a level floor spread over within a pixel, in the units of the
-        /// points; estimated from the points if `None`. Estimated noise never makes ε more than
-        /// 0.9, since otherwise walls would become floors
+        /// Height that the points of a level floor span within a pixel, in the units of the points;
+        /// estimated from the points if `None`. Estimated noise never makes ε more than 0.9, since
+        /// otherwise walls would become floors
         /// ([`About::is_noise_capped`](crate::About::is_noise_capped)).
         noise: Option<f64>,
     },

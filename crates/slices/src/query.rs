@@ -1,8 +1,8 @@
 //! Queries of boxes: collision, obstacles and the floor below.
 //!
-//! The pixels under the box in every slice between its bottom and its top (Anjos et al. 2012,
-//! §3.1); O(pixels · slices). The paper counts size/t pixels about the centre; here all pixels
-//! count that the closed box meets.
+//! A query looks at the pixels under the box in every slice between its bottom and its top (Anjos
+//! et al. 2012, §3.1), which takes O(pixels · slices) time. The paper uses size/t pixels about the
+//! centre. Here it is every pixel that the closed box meets.
 
 use std::ops::RangeInclusive;
 
@@ -17,8 +17,8 @@ use crate::{Block, Grid};
 /// Queries that a thread takes at a time.
 const CHUNK: usize = 64;
 
-/// Rows that are searched together for floors: slices that are empty there cost only a look at the
-/// tiles.
+/// Number of rows that are searched together for floors. A slice that is empty in all of them costs
+/// only a look at its tiles.
 const BAND: u32 = 32;
 
 /// The floor under a base that is not level (Anjos et al. 2012, §3.1).
@@ -119,7 +119,7 @@ impl SliceMap {
     /// Answers every query, on all cores with the feature `rayon`.
     ///
     /// # Panics
-    /// If the number of answers is not that of the boxes.
+    /// If there are not as many answers as boxes.
     pub fn query_each(&self, boxes: &[Aabb], floor: Floor, answers: &mut [Result<Occupancy, Unloaded>]) {
         assert_eq!(boxes.len(), answers.len(), "an answer a box");
         change_each(answers, CHUNK, |i, answer| *answer = self.query(&boxes[i], floor));

@@ -4,12 +4,13 @@ use crate::map::{SliceMap, Unloaded};
 use crate::steps::straight;
 use crate::walk::Walker;
 
-/// The greatest number of passes, and the share of the length below which a gain ends them.
+/// The greatest number of passes, and the least gain of a pass, as a share of the length, that lets
+/// another one follow.
 const MOST_PASSES: usize = 12;
 const LEAST_GAIN: f64 = 1e-3;
 
-/// Replaces parts of a path by straight lines. `path` has the states of a walker at the corners,
-/// each reached by walking straight from the one before. So has the result.
+/// Replaces parts of a path by straight lines. `path` and the result are the states of a walker at
+/// the corners of a path. The walker gets from each corner to the next one by walking straight.
 ///
 /// A shortcut is taken if the walker arrives in the very same state, so the rest stays walkable.
 /// Each pass searches for the farthest shortcut from a corner, first doubling the distance along
@@ -68,8 +69,8 @@ fn pulled(map: &SliceMap, path: &[Walker], falls: bool) -> Result<Vec<Walker>, U
     Ok(pulled)
 }
 
-/// Returns the states of a walker after every step of a path at which it stands, and the indices of
-/// the corners among them.
+/// Returns the states of a walker along a path, and the indices of the corners among them. There is
+/// a state for every step, unless the walker is falling.
 fn trail(map: &SliceMap, path: &[Walker], falls: bool) -> Result<(Vec<Walker>, Vec<usize>), Unloaded> {
     let mut trail: Vec<Walker> = path.first().copied().into_iter().collect();
     let mut corners = Vec::new();

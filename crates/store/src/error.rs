@@ -156,7 +156,7 @@ pub enum ContainerFault {
         /// Checksum of the bytes read.
         computed: u64,
     },
-    /// The section table ends behind the end of the file.
+    /// The section table extends beyond the end of the file.
     #[error(
         "damaged header: expected a table within {}, got {} up to byte {end}; prepare it again",
         bytes(length),
@@ -176,7 +176,7 @@ pub enum ContainerFault {
         /// Name of both sections.
         section: SectionId,
     },
-    /// A section ends behind the end of the file.
+    /// A section extends beyond the end of the file.
     #[error(
         "damaged section table: expected section {section} within {}, got {} at byte {offset}; prepare it again",
         bytes(limit),
@@ -223,7 +223,7 @@ pub enum ContainerFault {
     Unclaimed {
         /// Offset of the first such byte.
         offset: u64,
-        /// Offset behind the last such byte.
+        /// Offset of the end of the last such byte.
         end: u64,
     },
     /// The element size is zero, or the length of the section is not a multiple of it.

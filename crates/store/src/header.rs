@@ -128,7 +128,7 @@ impl Header {
         Ok(())
     }
 
-    /// Returns the offset behind the table. Cannot overflow, as the count is a `u32`.
+    /// Returns the offset of the end of the table. Cannot overflow, as the count is a `u32`.
     pub(crate) fn table_end(&self) -> u64 {
         HEADER_LEN as u64 + u64::from(self.count) * ENTRY_LEN as u64
     }

@@ -1,6 +1,6 @@
-//! The section table, and its checks, after which every read is a plain slice.
+//! The section table and its checks. Once they have passed, every read is a plain slice.
 //!
-//! The layout is canonical: sections follow in table order, each at the first multiple of 64 behind
+//! The layout is canonical: sections follow in table order, each at the first multiple of 64 after
 //! the previous one, and the file ends with the padding of the last. One pass over the table proves
 //! that sections do not overlap and that every byte belongs to a section, its padding, the table or
 //! the header.
@@ -38,7 +38,8 @@ impl Section {
         self.length / u64::from(self.element_size)
     }
 
-    /// Returns the offset behind the section. Cannot overflow once [`Section::check`] has passed.
+    /// Returns the offset of the end of the section. Cannot overflow once [`Section::check`] has
+    /// passed.
     pub(crate) fn end(&self) -> u64 {
         self.offset + self.length
     }
@@ -106,7 +107,7 @@ pub(crate) struct Table {
     /// In file order.
     pub(crate) sections: Vec<Section>,
     positions: BTreeMap<SectionId, usize>,
-    /// Offset behind the table.
+    /// Offset of the end of the table.
     end: u64,
 }
 
@@ -114,7 +115,7 @@ impl Table {
     /// Reads the table from `bytes`, the whole file. `header` must have been checked against their
     /// length.
     ///
-    /// Reads no byte behind the table. Takes O(n log n) time for n sections.
+    /// Reads no byte after the table. Takes O(n log n) time for n sections.
     pub(crate) fn parse(header: &Header, bytes: &[u8]) -> Result<Self, ContainerFault> {
         let limit = header.length;
         let end = header.table_end();

@@ -1,6 +1,6 @@
-//! The cost of curves of intersection of pairs of objects, by spacing. Beside it the search for the
-//! contacts that the curves start from, and a rival that follows no curve: Newton's method from
-//! every contact, which gives points in no order.
+//! The cost of curves of intersection of pairs of objects, by spacing. It is compared with the
+//! search for the contacts that the curves start from, and with a rival that follows no curve:
+//! Newton's method from every contact, which gives points in no order.
 //!
 //! Objects come in pairs, each scaled to a longest side of 2. The second of a pair is turned a
 //! little and shifted along x.

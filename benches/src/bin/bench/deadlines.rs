@@ -1,4 +1,5 @@
-//! Overruns of queries with a deadline, beside a loop that only reads the clock until then.
+//! Overruns of queries with a deadline, compared with a loop that only reads the clock until the
+//! deadline.
 //!
 //! The loop and the queries take turns, so both run under the same load. Only queries that a
 //! deadline ended count.

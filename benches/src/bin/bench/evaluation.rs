@@ -1,5 +1,5 @@
-//! The cost of one evaluation of f, at a leaf and anywhere, by instruction set. Beside it kiddo's
-//! search for as many nearest points as are summed.
+//! The cost of one evaluation of f, at a leaf and anywhere, by instruction set. The rival is
+//! kiddo's search for the same number of nearest points.
 
 use std::hint::black_box;
 use std::num::NonZero;

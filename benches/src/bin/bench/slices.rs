@@ -1,5 +1,5 @@
-//! Slice maps: points built per second, boxes against a map, steps of avatars, slices loaded.
-//! Beside them parry's voxels and a kd-tree on the same points.
+//! Slice maps: points built per second, boxes against a map, steps of avatars, slices loaded. The
+//! rivals are parry's voxels and a kd-tree on the same points.
 //!
 //! A scan is a file with z up, or `house` for the generated one.
 

@@ -30,13 +30,14 @@ pub struct PreprocessArgs {
     /// The filters
     #[command(flatten)]
     pub filters: FilterArgs,
-    /// Neighbours that set the local radius of a point; more where points lie on lines; 3 to 32
+    /// Number of neighbours within the local radius of a point, 3 to 32; more where points lie on
+    /// lines
     #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32), help_heading = "Surface")]
     pub radius_neighbours: u32,
     /// Largest gap to bridge between points, in the units of the input
     ///
-    /// No wider gap is bridged, and no ball is wider. By default twice the sampling radius,
-    /// within which nine tenths of the points have six neighbours.
+    /// A wider gap counts as a hole. Balls about points have at most this diameter. The default is
+    /// twice the sampling radius, which is the 0.9-quantile of the local radii.
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach, help_heading = "Surface")]
     pub reach: Option<f64>,
     /// Weight of a point by its distance
@@ -55,13 +56,13 @@ pub struct PreprocessArgs {
     /// Number of neighbours that sets the size of spheres of influence, 1 to 32; by default 4;
     /// implies --graph
     ///
-    /// Two points are joined in the graph if the spheres about them meet that reach to their
-    /// nearest points of this number.
+    /// The sphere of influence of a point reaches to its R-th nearest neighbour. The graph joins
+    /// two points if their spheres overlap.
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(1..=32), help_heading = "Research", hide_short_help = true)]
     pub neighbours: Option<u32>,
     /// Add the map of close pairs, which the geodesic kernel needs; implies --graph
     ///
-    /// It takes most of the file.
+    /// The map takes most of the space in the file.
     #[arg(long, help_heading = "Graph")]
     pub close_pairs: bool,
     /// Store the shortest paths of close pairs, or rebuild them when needed; implies
@@ -70,8 +71,8 @@ pub struct PreprocessArgs {
     pub paths: Option<PathsName>,
     /// Distances that define the surface; `geodesic` implies --close-pairs
     ///
-    /// Distances along the graph keep sheets apart that are close to each other. Of the
-    /// geodesic kernel, only contacts are certified.
+    /// Distances along the graph keep close sheets apart. With the geodesic kernel, contacts are
+    /// certified, but separations are not.
     #[arg(long, value_enum, default_value_t = KernelName::Euclidean, help_heading = "Graph")]
     pub kernel: KernelName,
     /// Position of the scanner, in the frame of the input: normals are turned towards it;

@@ -18,13 +18,14 @@ pub struct AvatarArgs {
     /// Width, depth and height of the avatar
     #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.6", value_parser = parse_avatar)]
     pub avatar: AvatarBox,
-    /// Height that the avatar climbs at once, and falls in a step
+    /// Climb: the greatest height that the avatar steps up at once, and the height that it falls in
+    /// one step
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
     pub climb: f64,
     /// Length of a step; by default a pixel's side
     ///
-    /// It is also the distance between searched places. The lesser side of the avatar's base limits
-    /// it, so that the avatar steps over nothing.
+    /// It is also the distance between searched places. A step is never longer than the lesser side
+    /// of the avatar's base, so that the avatar cannot pass over an obstacle.
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
     pub step: Option<f64>,
 }

@@ -33,7 +33,7 @@ pub struct BuildArgs {
     /// Height of a slice; by default three pixels
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
     pub slice_height: Option<f64>,
-    /// Share of a slice that an obstacle spans upwards within a pixel
+    /// Share of a slice's height: if the points of a pixel span more, they are an obstacle
     ///
     /// Anjos et al. 2012 use 0.07. By default, --max-slope and --noise decide.
     #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["max_slope", "noise"])]
@@ -41,10 +41,10 @@ pub struct BuildArgs {
     /// Slope above which a surface is an obstacle, in degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, default_value_t = 45.0)]
     pub max_slope: f64,
-    /// Height that points of a level floor spread over within a pixel
+    /// Noise: the height that the points of a level floor span within a pixel
     ///
-    /// By default, it is 0 for a mesh and estimated for points. An estimate counts only up to the
-    /// noise that makes 90 % of a slice an obstacle.
+    /// By default, it is 0 for a mesh and estimated for points. An estimate is limited, so that
+    /// points which span 90 % of a slice are an obstacle in any case.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
     /// Axis that points up: x, y, z, -x, -y or -z

@@ -22,7 +22,7 @@ const OFF: f64 = 0.1;
 pub struct QueryArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// Boxes, one line `{"min":[x,y,z],"max":[x,y,z]}` each
+    /// Boxes, each on a line `{"min":[x,y,z],"max":[x,y,z]}`
     #[arg(long, value_name = "FILE.jsonl")]
     pub boxes: Option<PathBuf>,
     /// Another map to test against this one in the poses of --poses
@@ -34,10 +34,10 @@ pub struct QueryArgs {
     /// (optional) and `b` that of the other.
     #[arg(long, value_name = "FILE.jsonl", requires = "map")]
     pub poses: Option<PathBuf>,
-    /// Floor under a base: its highest pixel, or the mean of all
+    /// Height of the floor below a box: that of its highest pixel, or the mean of all
     #[arg(long, value_enum, default_value_t = FloorName::Max)]
     pub floor: FloorName,
-    /// Print one JSON object a query
+    /// Print one JSON object for each query
     #[arg(long)]
     pub json: bool,
 }

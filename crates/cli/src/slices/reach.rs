@@ -21,7 +21,7 @@ use crate::output;
 pub struct ReachArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// Place of the feet, within a climb of something that supports the avatar
+    /// Place of the feet, at most --climb above or below something that supports the avatar
     #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub start: Spot,
     /// The avatar
@@ -33,7 +33,7 @@ pub struct ReachArgs {
     /// Draw the storeys from above with the places within reach, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
-    /// Write the places of the feet, one line x,y,z each
+    /// Write the places of the feet, a line x,y,z for each
     #[arg(long, value_name = "OUT.csv")]
     pub csv: Option<PathBuf>,
     /// Print one JSON object instead of sentences

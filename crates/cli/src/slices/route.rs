@@ -21,12 +21,14 @@ use crate::output;
 pub struct RouteArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// Place of the feet at the start, within a climb of something that supports the avatar
+    /// Place of the feet at the start, at most --climb above or below something that supports the
+    /// avatar
     #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub from: Spot,
-    /// Place of the feet at the goal, within a climb of something that supports the avatar
+    /// Place of the feet at the goal, at most --climb above or below something that supports the
+    /// avatar
     ///
-    /// The avatar ends within a climb of its height.
+    /// The avatar may arrive higher or lower than this place, by at most --climb.
     #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub to: Spot,
     /// The avatar

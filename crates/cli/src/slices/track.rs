@@ -10,8 +10,8 @@ const MOST: usize = 1 << 20;
 /// Greatest number of kept stops.
 const MOST_STOPS: usize = 1000;
 
-/// The places of a walk, in the map's coordinates, with their distances from the start. Of longer
-/// walks it keeps every second place, every fourth, and so on.
+/// The places of a walk, in the map's coordinates, with their distances from the start. For a
+/// longer walk, only every second place is kept, or every fourth, and so on.
 pub(super) struct Track {
     /// The start first.
     pub(super) places: Vec<[f64; 3]>,
@@ -19,12 +19,14 @@ pub(super) struct Track {
     pub(super) distances: Vec<f64>,
     /// The points of the route, in the map's coordinates.
     pub(super) targets: Vec<[f64; 2]>,
-    /// For each of them the number of the first one at the same place, counted from 1.
+    /// For each point of the route, the number of the first point at the same place, counted from
+    /// 1.
     pub(super) numbers: Vec<usize>,
-    /// Distance and height where the points were reached, in turn, as far as they were.
+    /// Distance and height of the avatar at each point of the route that it has reached, in their
+    /// order.
     pub(super) reached: Vec<[f64; 2]>,
-    /// Places where the avatar was stopped, with the distance; consecutive duplicates once, only
-    /// the first ones.
+    /// Places where the avatar was stopped, with the distance. Only the first places are kept, and
+    /// consecutive equal ones once.
     pub(super) stops: Vec<([f64; 3], f64)>,
     /// Number of steps between kept places.
     every: usize,

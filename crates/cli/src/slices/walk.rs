@@ -27,7 +27,7 @@ pub struct WalkArgs {
     pub folder: PathBuf,
     /// Route, as `{"start":[x,y,z],"points":[[x,y],…]}`
     ///
-    /// The points are the two coordinates across the axis that points up.
+    /// The numbers of a point are its two horizontal coordinates, in the order of the input.
     #[arg(long, value_name = "FILE.json")]
     pub route: PathBuf,
     /// The avatar
@@ -38,7 +38,7 @@ pub struct WalkArgs {
     pub response: ResponseName,
     /// Slices kept in memory; by default 16
     ///
-    /// It is raised to the number that the avatar spans.
+    /// A number that is too small for the height of the avatar is raised.
     #[arg(long, value_name = "N")]
     pub cache: Option<u32>,
     /// Load slices only when they are needed
@@ -47,10 +47,10 @@ pub struct WalkArgs {
     /// Draw the storeys from above with the route, and height over distance, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
-    /// Write each step, one line distance,x,y,z,blocked,falling each
+    /// Write a line distance,x,y,z,blocked,falling for each step
     #[arg(long, value_name = "OUT.csv")]
     pub trace: Option<PathBuf>,
-    /// Print one JSON object a step
+    /// Print one JSON object for each step
     ///
     /// The output is reproducible except for the stalls, which depend on the speed of loading
     /// ahead. With --no-prefetch they are reproducible too.

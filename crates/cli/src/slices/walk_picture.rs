@@ -87,9 +87,9 @@ fn paint_storey(canvas: &mut Canvas, view: &View<'_>, track: &Track, heights: [f
     }
 }
 
-/// Returns ranges of height that contain all places, none empty: a single one unless the walk
-/// crosses above itself. Otherwise they are those of the storeys of the map that the walk was on,
-/// or equal ones if it was on one alone.
+/// Returns ranges of height that contain all places; none of them is empty. It is a single range
+/// unless the walk crosses above itself. If it does, the ranges are those of the storeys that the
+/// walk was on, or equal parts if it was on a single storey.
 fn storeys(track: &Track, avatar: &AvatarOptions, floors: &[Storey]) -> Vec<[f64; 2]> {
     let heights = || track.places.iter().map(|p| p[2]);
     let low = heights().fold(f64::INFINITY, f64::min);

@@ -142,7 +142,7 @@ impl Frontier for Plunging<'_> {
         self.stack.pop()
     }
 
-    /// Brings the most urgent pair to the top (of several the first), unless all turns are used up.
+    /// Brings the most urgent pair (the first of equals) to the top, unless all turns are used up.
     #[inline(always)]
     fn settle<S: Simd>(&mut self, simd: S) {
         let Some(left) = self.turns.checked_sub(1) else { return };

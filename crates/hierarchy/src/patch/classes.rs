@@ -25,12 +25,12 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// The number of neighbours that vote.
 const VOTERS: usize = 8;
 
-/// The number of voters with similar normals, half of them, that makes a noisy point one of their
-/// sheet.
+/// A noisy point joins a sheet if at least this many voters, half of all, are on it with similar
+/// normals.
 const MAJORITY: usize = VOTERS / 2;
 
-/// A sheet point is noisy if fewer of its neighbours are sheet points with a similar normal: one
-/// can be a coincidence.
+/// A sheet point is noisy if fewer than this many of its neighbours are sheet points with a similar
+/// normal: one can be a coincidence.
 const ALONE: usize = 2;
 
 /// The least cosine of the angle between the normals of neighbours on one sheet. On a sphere of the
@@ -94,10 +94,10 @@ fn corrected(
     }
 }
 
-/// Returns the points in their order, but with the sparse ones last, and the number of points
-/// before these: as many as fill whole leaves. The remainder is moved to the sparse points: noisy
-/// ones first, then those at edges, then others, and of each kind the last ones. Returns `None` if
-/// no point is sparse.
+/// Returns the points in their order, but with the sparse ones last, and the number of the points
+/// before them. These fill whole leaves; a remainder is moved to the sparse points. It consists of
+/// noisy points if there are enough, then of points at edges, then of others, and of each kind the
+/// last ones are moved. Returns `None` if no point is sparse.
 pub(crate) fn dense_first(
     positions: &[[f32; 3]],
     fits: &[Fit],

@@ -27,7 +27,8 @@ use crate::point::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
 use crate::point::neighbours::Locality;
 use crate::point::spacing::{Look, Spacing};
 
-/// The number of sectors of the tangent plane. They are equal on a diamond: 11 to 18 degrees.
+/// The number of sectors of the tangent plane. They have equal shares of the perimeter of a
+/// diamond, so they are 11 to 18 degrees wide.
 const SECTORS: u32 = 24;
 
 /// If λ2 < 0.05 λ3 the neighbourhood is a line, and its normal is any direction across.

@@ -23,9 +23,9 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// them do.
 const LINE_NEIGHBOURS: usize = 32;
 
-/// The maximum number of neighbours. 256 neighbours along a ring reach another ring a hundred
-/// spacings away, as sixteen beams 2° apart, 0.2° along, leave it on a floor with a slope of one in
-/// ten. Points alone for longer are a wire, or isolated.
+/// The maximum number of neighbours. 256 neighbours along a ring suffice to find another ring a
+/// hundred spacings away. Sixteen beams 2° apart, with a return every 0.2°, leave such gaps on a
+/// floor with a slope of one in ten. A line with no other line that near is a wire, or isolated.
 const MOST_NEIGHBOURS: usize = 256;
 
 /// Points look like a line if λ2 < 0.05 λ3, which tolerates noise.

@@ -213,7 +213,7 @@ impl PointHierarchy {
     }
 
     /// Replaces the boxes of all nodes, given in the order of their ids; then recomputes leaf
-    /// blocks, marks and outline. The growths stay: valid only if the enclosures are the same.
+    /// blocks, marks and outline. The growths are kept, so the enclosures must be the same.
     pub(crate) fn bound(&mut self, boxes: &[OrientedBox]) {
         self.meta.root.bounds = boxes[NodeId::ROOT.index()];
         siblings(&self.topology, boxes, self.arrays.siblings.to_mut());

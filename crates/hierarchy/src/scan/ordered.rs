@@ -1,5 +1,5 @@
-//! The points in the order of their final tree, whose root separates dense from sparse points, with
-//! their radii and classes.
+//! The points in the order of their final tree, with their radii and classes. Dense points come
+//! first, sparse points last.
 
 use bytemuck::Pod;
 use nearmiss_index::{BlockBoxes, PointBlock};

@@ -15,8 +15,8 @@ use crate::tree::topology::Topology;
 /// The share of points whose local radius is at most the scan's sampling radius.
 const SAMPLING_QUANTILE: f64 = 0.9;
 
-/// The default reach, over the quantile of the radii before they are limited: a gap is bridged if
-/// its middle is no further than that quantile from either side.
+/// The default reach divided by the 0.9-quantile of the radii, before radii are limited. With 2,
+/// the middle of the widest bridged gap is that quantile away from either side.
 const REACH: f32 = 2.0;
 
 /// The sampling density of a scan, and the quantities derived from it.
@@ -33,7 +33,8 @@ pub(crate) struct Sampling {
 
 impl Sampling {
     /// Computes the sampling density of points under the nodes of `topology`, and sets the greatest
-    /// radii in `boxes`. `unit` is the caller's unit in units of the points.
+    /// radii in `boxes`. `unit` is the length of the caller's unit in the coordinates of the
+    /// points.
     pub(crate) fn of(
         positions: &[[f32; 3]],
         (topology, boxes): (&Topology, &mut [OrientedBox]),
@@ -80,8 +81,9 @@ fn extent(positions: &[[f32; 3]]) -> f32 {
     positions.iter().flatten().fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Returns the [sampling radius](sampling_rank) of radii, none of which may be negative. The bits
-/// of such numbers are in their order, and are counted, the upper half first.
+/// Returns the [sampling radius](sampling_rank) of radii, none of which may be negative. Numbers
+/// that are not negative have the same order as their bits. So the upper halves of the bits are
+/// counted first, then the lower halves.
 fn quantile(radii: &[f32]) -> f32 {
     const HALF: u32 = 16;
     let mut rank = sampling_rank(radii.len());

@@ -14,7 +14,7 @@ use crate::scan::build::PointHierarchy;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// The maximum number of sampled blocks of points on sheets; half as many of other points.
+/// The maximum number of sampled blocks of points on sheets. For other points it is half of this.
 const BLOCKS: usize = 128;
 
 /// The rank of the neighbour whose distance is the spacing.
@@ -42,8 +42,8 @@ const FAR: f64 = 20.0;
 /// for: 25°.
 const CONE: f64 = 0.906;
 
-/// The far side of a hole has a normal within the angle of this cosine of that of the near side.
-/// Its height over the near side's tangent plane is at most this share of the width.
+/// The normals on both sides of a hole differ by at most the angle with this cosine. The height of
+/// the far side over the tangent plane of the near side is at most this share of the width.
 const PARALLEL: f64 = 0.9;
 const LEVEL: f64 = 0.15;
 

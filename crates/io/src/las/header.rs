@@ -138,7 +138,7 @@ impl Header {
         }
     }
 
-    /// Checks that the points start behind the header and, if uncompressed, that the file contains
+    /// Checks that the points start after the header and, if uncompressed, that the file contains
     /// all of them.
     pub(super) fn check(&self, length: u64) -> Result<(), Broken> {
         if self.start < SHORTEST as u64 || self.start > length {

@@ -25,8 +25,8 @@ const LARGEST: i32 = 500;
 /// The smallest encoded multiple of the usual step.
 const SMALLEST: i32 = -10;
 
-/// Number of symbols if the usual step is unknown: the previous time, a step, then as from [`SAME`]
-/// + 1 on.
+/// Number of symbols if the usual step is unknown. They mean the previous time, a step, and then
+/// the same as the symbols after [`SAME`].
 const FIRST_SYMBOLS: u32 = 6;
 
 /// The symbol for the previous time, if the usual step is known. Smaller symbols encode multiples.

@@ -270,8 +270,8 @@ impl Follower<'_> {
 struct Refusal {
     /// The reason for the end of the curve if no shorter step succeeds.
     end: CurveEnd,
-    /// `true` if a surface was found to end from so near that no other step of this length will
-    /// succeed.
+    /// `true` if a surface ends here, and an evaluation so near to the end showed it that no other
+    /// step of this length will succeed.
     is_wall: bool,
 }
 

@@ -1,8 +1,9 @@
 //! Points on two surfaces near two samples, moved towards each other along the surfaces.
 //!
 //! Projected gradient descent on the distance, with steps that are halved if they go too far. The
-//! first step is right along flat surfaces and surfaces that bend away from each other. Over tips
-//! it is too long by the ratio of the other surface's distance to the tip's radius.
+//! first step has the right length on flat surfaces, and on surfaces that bend away from each
+//! other. Near the tip of a surface it is too long, by a factor of the distance to the other
+//! surface over the radius of the tip.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Projection, Status, project};
@@ -16,7 +17,7 @@ const ROUNDS: u32 = 8;
 /// A step is skipped if it would gain less than this share of the sampling radius.
 const ENOUGH: f64 = 1e-3;
 
-/// Steps are shortened down to this share before the point stays.
+/// A point stops if its steps would have to be shorter than this share.
 const SHORTEST: f64 = 1.0 / 16.0;
 
 /// A point on each surface.
@@ -36,10 +37,10 @@ pub(crate) struct Approach<'a, 's> {
 }
 
 impl Approach<'_, '_> {
-    /// Returns the nearest verified points of both surfaces that were found. Starting at the
-    /// samples' feet, the points take turns stepping along their surface towards each other. A step
-    /// is at most a local radius long, and half as long after a step that went away. Returns `None`
-    /// if the first such points are not found or the budget ends before.
+    /// Returns two verified points, one on each surface, that are near each other. They start at
+    /// the feet of the samples and take turns stepping along their surfaces towards each other. A
+    /// step is at most a local radius long. It is halved after a step that increased the distance.
+    /// Returns `None` if no starting points are found or the budget ends first.
     pub(crate) fn run(&mut self) -> Option<Feet> {
         let starts = [0, 1].map(|side| self.views[side].point(self.samples[side]));
         let mut feet = [self.land(0, starts[0])?, self.land(1, starts[1])?];
@@ -80,8 +81,8 @@ impl Approach<'_, '_> {
         true
     }
 
-    /// The verified surface point below `x`. If the surface ends before, the one below the centroid
-    /// of the last evaluation.
+    /// Returns the verified surface point below `x`. If `x` is beyond a border of the surface,
+    /// projects the centroid of the last evaluation instead.
     fn land(&mut self, side: usize, x: [f64; 3]) -> Option<Projection> {
         let foot = self.project(side, x)?;
         if foot.at.status != Status::Border || foot.converged {

@@ -43,9 +43,9 @@ impl Nearness {
     }
 }
 
-/// Steps that visit the nearest pair of all, which a heap finds. By then the limits are near their
-/// final values, and the last pair postponed is visited next: that visits some more pairs, but a
-/// heap takes longer than those.
+/// The number of steps that visit the nearest of all pairs, found by a heap. After these steps the
+/// limits are near their final values. Then the pair that was postponed last is visited next. That
+/// visits some more pairs, but it takes less time than a heap.
 const NEAREST_FIRST: u32 = 128;
 
 /// Reusable memory for the open node pairs.

@@ -118,8 +118,8 @@ fn in_terms_of<S: Simd>([u, v, w]: &[[f32; 3]; 3], [x, y, z]: &[f32x16<S>; 3]) -
     [x * u[0] + y * u[1] + z * u[2], x * v[0] + y * v[1] + z * v[2], x * w[0] + y * w[1] + z * w[2]]
 }
 
-/// The distance limit in b's stored frame for points within `distance` of each other, excluding
-/// their balls, enlarged by the rounding error.
+/// An upper bound, in b's stored frame, of the computed distance of points that are within
+/// `distance` of each other. Allows for rounding; does not include the balls of the points.
 #[inline(always)]
 fn reach_of(pair: &ScanPair<'_>, distance: f64) -> f32 {
     let stored = pair.stored(distance.max(0.0)) + 3.0 * pair.relative.slack();

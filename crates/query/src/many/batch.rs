@@ -13,8 +13,8 @@ use crate::ask::answer::Answer;
 use crate::ask::budget::Deadline;
 use crate::question::Scratch;
 
-/// Questions that a worker takes at once. Few enough that those cut short by a deadline, one clock
-/// read each, take a few microseconds together, and enough to hide the cost of the lock.
+/// Questions that a worker takes at once: enough to hide the cost of the lock, and few enough to
+/// end soon after a deadline. Each of them then takes only a clock read.
 const MOST_AT_ONCE: usize = 16;
 
 /// Turns per worker in a small batch, so that a hard question delays few others.

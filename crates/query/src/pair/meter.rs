@@ -38,8 +38,8 @@ pub(crate) struct Meter {
     leaf_work: u64,
     /// The total work at which the clock or the work limit is checked next.
     next_look: u64,
-    /// No limit can be reached below this count of node pairs, unless other work is counted;
-    /// counting other work resets it to 0.
+    /// While fewer node pairs than this are counted, no limit can be reached. Any other work that
+    /// is counted sets it to 0.
     free_until: u64,
     /// The time of the last clock read.
     looked: Option<Instant>,

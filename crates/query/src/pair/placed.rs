@@ -194,8 +194,8 @@ impl<'a> Placed<'a> {
     }
 
     /// Evaluates |f| at `x`; faster if `x` is near the last point evaluated with this scratch. The
-    /// sign is arbitrary. `nearest` is the stored point nearest to the last `x`, or any; it is
-    /// updated if the kernel needs the nearest point.
+    /// sign is arbitrary. `nearest` is any stored point; the call is fastest with the one nearest
+    /// to the last `x`. If the kernel needs the nearest point, `nearest` is updated to it.
     pub(crate) fn evaluate_onward(
         &self,
         x: [f64; 3],

@@ -1,9 +1,9 @@
 //! A closer test of node pairs whose boxes overlap (Klein & Zachmann 2004, §5.1 and §5.2).
 //!
-//! Their sphere coverings may be disjoint. Otherwise the sample points of a's node on either side
-//! of f′_B, the function defined by the sample points of b's node, estimate how likely the surfaces
-//! cross. Only points further from f′_B than the covering radius of b's node count, as nearer ones
-//! say little about f_B.
+//! If the sphere coverings of the nodes are disjoint, the pair is pruned. Otherwise the sample
+//! points of a's node are counted on either side of f′_B, the function that the sample points of
+//! b's node define. The counts estimate how likely the surfaces cross. Only points further from
+//! f′_B than the covering radius of b's node count, as nearer ones say little about f_B.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Extent, NodePair, apart as coverings_apart};
@@ -38,7 +38,7 @@ impl Papers<'_, '_> {
         Some(share - sides)
     }
 
-    /// The number, weighted, of a's sample points on the side of f′_B that has fewer.
+    /// The weighted number of a's sample points on the side of f′_B that has fewer of them.
     fn sides(&mut self, pair: NodePair, weight: impl Fn([f64; 3]) -> f64) -> f32 {
         let [va, vb] = self.search.pair.views;
         let near = f64::from(self.search.pair.b.covering_radius(pair.b.index()));

@@ -20,8 +20,8 @@ use crate::tree::wide::{Siblings, Tree};
 const ASKEW: f32 = 1e-3;
 
 /// Greatest extent of a child beyond its parent that rounding explains, relative to their
-/// coordinates. Both boxes were enlarged by 2e-6 of their own coordinates, and the comparison
-/// rounds as much again.
+/// coordinates. Both boxes were enlarged by 2e-6 of their own coordinates, and the comparison has
+/// the same rounding error.
 const STICKS_OUT: f32 = 8e-6;
 
 /// The count of numbers in a box.

@@ -1,6 +1,6 @@
 //! Sides of b, and a cache of them.
 
-/// The least confidence of an orientation, of 255, that determines sides.
+/// The least confidence of a normal's orientation, from 0 to 255, with which sides are known.
 pub(super) const CERTAIN: u8 = 64;
 
 /// The side of b on which a point is.
