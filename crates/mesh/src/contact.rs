@@ -25,10 +25,11 @@ pub struct TriangleContact {
 /// Returns the contact of two triangles, or `None` if they do not meet.
 ///
 /// Whether they meet, and which edges bound the common segment, is decided exactly, as by
-/// [`triangles_meet`](crate::triangles_meet). The ends are then computed from exact volumes, so
-/// each of their coordinates is within four units of rounding (4 · 2^-52) of the exact one,
-/// relative to the largest magnitude of that coordinate at the corners of the edge on which the end
-/// lies. This holds for nearly parallel planes too. For finite corners the result is finite.
+/// [`triangles_meet`](crate::triangles_meet). The ends are then computed from volumes: in floating
+/// point where its error is small, exactly where it may not be. So each of their coordinates is
+/// within 70 units of rounding (70 · 2^-52) of the exact one, relative to the largest magnitude of
+/// that coordinate at the corners of the edge on which the end lies. This holds for nearly parallel
+/// planes too. For finite corners the result is finite.
 ///
 /// # Cost
 /// Takes about 1.5 µs for a pair that meets. For any other pair it takes as long as

@@ -22,8 +22,8 @@ use crate::pair::meter::Meter;
 use crate::pair::placed::{Placed, ViewScratch};
 use crate::pair::scan_pair::{ScanPair, motion_of, relative};
 use approach::{Approach, Feet};
-pub(crate) use search::Frontier;
 use search::Search;
+pub(crate) use search::{Frontier, Nearness};
 
 /// Options of a distance query. Plain values; [`DistancePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -28,6 +28,7 @@ pub use leaf::crossing::{Disc, crossing};
 pub use many::batch::{BatchScratch, Until, each};
 pub use many::world::{Bodies, BodyId, World};
 pub use mesh::answer::{MeshAnswer, MeshContact, MeshVerdict};
+pub use mesh::distance::MeshDistance;
 pub use mesh::pair::{MeshHint, MeshPair, MeshScratch};
 pub use mesh::placed::PlacedMesh;
 pub use pair::placed::Placed;

@@ -2,6 +2,7 @@
 
 pub(crate) mod answer;
 pub(crate) mod collide;
+pub(crate) mod distance;
 pub(crate) mod mesh_pair;
 pub(crate) mod pair;
 pub(crate) mod placed;

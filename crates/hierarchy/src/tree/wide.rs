@@ -124,7 +124,14 @@ impl<'a> Tree<'a> {
         self.topology
     }
 
-    /// Returns the box around the discs and balls of a node's points.
+    /// Returns the box of the root.
+    #[inline]
+    #[must_use]
+    pub fn root_box(&self) -> &'a OrientedBox {
+        &self.root.bounds
+    }
+
+    /// Returns the box around the discs and balls of a node's points, or around its triangles.
     ///
     /// # Panics
     /// If there is no such node. The same holds for the other methods.

@@ -26,12 +26,12 @@ pub(crate) struct Nearness(
 
 impl Nearness {
     #[inline]
-    fn new(enclosures: f32, boxes: f32) -> Self {
+    pub(crate) fn new(enclosures: f32, boxes: f32) -> Self {
         Self(u64::from(ascending(enclosures)) << 32 | u64::from(ascending(boxes)))
     }
 
     #[inline]
-    fn enclosures(self) -> f32 {
+    pub(crate) fn enclosures(self) -> f32 {
         from_ascending((self.0 >> 32) as u32)
     }
 
@@ -61,13 +61,15 @@ pub(crate) struct Frontier {
 }
 
 impl Frontier {
-    fn clear(&mut self) {
+    /// Removes all pairs, and adds the pair of the roots.
+    pub(crate) fn start(&mut self, key: Nearness) {
         self.heap.clear();
         self.stack.clear();
         self.steps = 0;
+        self.stack.push(Open { pair: NodePair::ROOTS, key });
     }
 
-    fn iter(&self) -> impl Iterator<Item = Nearness> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Nearness> {
         self.heap.iter().map(|open| open.0.0).chain(self.stack.iter().map(|open| open.key))
     }
 }
@@ -142,9 +144,7 @@ impl<'a> Search<'a> {
 
     /// Searches from the roots down. Breaks if the search was ended early.
     pub(crate) fn run(&mut self, open: &mut Frontier) -> ControlFlow<()> {
-        open.clear();
-        let key = Nearness::new(self.motion.least(), self.motion.least());
-        open.stack.push(Open { pair: NodePair::ROOTS, key });
+        open.start(Nearness::new(self.motion.least(), self.motion.least()));
         self.pair.meter.go_on()?;
         self.go_on(open)
     }

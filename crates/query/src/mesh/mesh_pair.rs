@@ -8,8 +8,9 @@ use nearmiss_mesh::Corners;
 use crate::ask::budget::Budget;
 use crate::mesh::answer::MeshContact;
 use crate::mesh::placed::PlacedMesh;
-use crate::mesh::triangle_pairs::may_meet;
+use crate::mesh::triangle_pairs::{least_distances, may_meet};
 use crate::pair::meter::Meter;
+use crate::pair::motion::Motion;
 use crate::pair::placed_balls::PlacedBalls;
 
 /// The cost of a leaf pair, in node pairs.
@@ -57,6 +58,21 @@ impl<'a> MeshPairing<'a> {
         'a: 't,
     {
         TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach: relative.slack() }
+    }
+
+    /// Prepares the relative pose for bounds of distances.
+    pub(crate) fn motion(&self) -> Motion {
+        let roots = [self.a, self.b].map(|mesh| mesh.tree.root_box());
+        let placed = [self.meshes[0].placed(), self.meshes[1].placed()];
+        Motion::new(roots, placed, &self.stored)
+    }
+
+    /// Lower bounds on the distances of the triangle pairs of two leaves, in a's stored frame; see
+    /// [`least_distances`].
+    pub(crate) fn least_distances(&mut self, [a, b]: [usize; 2]) -> [f32; LEAF_TRIANGLES * LEAF_TRIANGLES] {
+        self.meter.spent.leaf_pairs += 1;
+        self.meter.leaf_work(LEAF_PAIR);
+        least_distances(self.level, [&self.a.blocks[a], &self.b.blocks[b]], &self.relative)
     }
 
     /// Returns the corners of the `i`-th triangle of a and the `j`-th of b in the frame of a's input.

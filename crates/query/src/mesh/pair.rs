@@ -5,8 +5,10 @@ use nearmiss_hierarchy::Stack;
 
 use crate::ask::answer::Statistics;
 use crate::ask::budget::Budget;
+use crate::distance::Frontier;
 use crate::mesh::answer::{MeshAnswer, MeshContact, MeshVerdict};
 use crate::mesh::collide::collide;
+use crate::mesh::distance::{MeshDistance, distance};
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::placed::PlacedMesh;
 
@@ -16,6 +18,7 @@ use crate::mesh::placed::PlacedMesh;
 pub struct MeshScratch {
     level: Level,
     stack: Stack,
+    open: Frontier,
 }
 
 impl Default for MeshScratch {
@@ -29,15 +32,16 @@ impl MeshScratch {
     /// available ones, for comparisons. Answers do not depend on it.
     #[must_use]
     pub fn by_level(level: Level) -> Self {
-        Self { level, stack: Stack::default() }
+        Self { level, stack: Stack::default(), open: Frontier::default() }
     }
 }
 
-/// The triangles that met in the last query of a pair of meshes. A query that starts from them
-/// answers at once if they still meet. A hint never changes a verdict.
+/// The triangles that met, or were nearest, in the last query of a pair of meshes. The next query
+/// compares them first. A hint never changes a verdict or a distance.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MeshHint {
     met: Option<[u32; 2]>,
+    nearest: Option<[u32; 2]>,
 }
 
 /// Two placed meshes and the budget of each question about them.
@@ -94,13 +98,13 @@ impl<'a> MeshPair<'a> {
     /// Decides whether a triangle of a and a triangle of b share a point. Exact without a budget;
     /// touching counts. Does not allocate once `scratch` is warm.
     pub fn collide(&self, scratch: &mut MeshScratch) -> MeshAnswer {
-        let MeshScratch { level, stack } = scratch;
+        let MeshScratch { level, stack, .. } = scratch;
         self.ask(*level, |pair| collide(pair, stack, None, None)).unwrap_or(INVALID)
     }
 
     /// Like [`Self::collide`], but tries the triangles of `hint` first, and updates it.
     pub fn collide_hinted(&self, hint: &mut MeshHint, scratch: &mut MeshScratch) -> MeshAnswer {
-        let MeshScratch { level, stack } = scratch;
+        let MeshScratch { level, stack, .. } = scratch;
         self.ask(*level, |pair| collide(pair, stack, Some(&mut hint.met), None)).unwrap_or(INVALID)
     }
 
@@ -111,10 +115,26 @@ impl<'a> MeshPair<'a> {
     pub fn contacts(&self, contacts: &mut Vec<MeshContact>, scratch: &mut MeshScratch) -> (MeshAnswer, bool) {
         contacts.clear();
         let mut complete = false;
-        let MeshScratch { level, stack } = scratch;
+        let MeshScratch { level, stack, .. } = scratch;
         let all = (contacts, &mut complete);
         let answer = self.ask(*level, |pair| collide(pair, stack, None, Some(all))).unwrap_or(INVALID);
         (answer, complete)
+    }
+
+    /// Bounds the distance of the meshes: lower ≤ distance ≤ upper. Both bounds are valid whenever
+    /// the budget ends the search, and equal without one. Meshes that meet have distance 0.
+    ///
+    /// Does not allocate once `scratch` is warm.
+    pub fn distance(&self, scratch: &mut MeshScratch) -> MeshDistance {
+        let MeshScratch { level, open, .. } = scratch;
+        self.ask(*level, |pair| distance(pair, open, None)).unwrap_or(UNKNOWN)
+    }
+
+    /// Like [`Self::distance`], but starts from the triangles of `hint`, which are those of the last
+    /// query, and updates it. Much faster if the poses changed little.
+    pub fn distance_hinted(&self, hint: &mut MeshHint, scratch: &mut MeshScratch) -> MeshDistance {
+        let MeshScratch { level, open, .. } = scratch;
+        self.ask(*level, |pair| distance(pair, open, Some(&mut hint.nearest))).unwrap_or(UNKNOWN)
     }
 
     /// Calls `ask` with the pair under its relative pose; `None` if a pose is invalid.
@@ -125,7 +145,17 @@ impl<'a> MeshPair<'a> {
 }
 
 /// The answer for an invalid pose.
-const INVALID: MeshAnswer = MeshAnswer {
-    verdict: MeshVerdict::Pose,
-    statistics: Statistics { evaluations: 0, node_pairs: 0, leaf_pairs: 0, neighbour_steps: 0 },
+const INVALID: MeshAnswer = MeshAnswer { verdict: MeshVerdict::Pose, statistics: NOTHING };
+
+/// The distance for an invalid pose.
+const UNKNOWN: MeshDistance = MeshDistance {
+    lower: 0.0,
+    upper: f64::INFINITY,
+    points: [[0.0; 3]; 2],
+    triangles: [0; 2],
+    complete: false,
+    statistics: NOTHING,
 };
+
+/// No cost.
+const NOTHING: Statistics = Statistics { evaluations: 0, node_pairs: 0, leaf_pairs: 0, neighbour_steps: 0 };

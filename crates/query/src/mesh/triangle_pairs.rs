@@ -5,7 +5,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
-use nearmiss_hierarchy::{Relative, TriangleBlock};
+use nearmiss_hierarchy::{LEAF_TRIANGLES, Relative, TriangleBlock};
 use nearmiss_lanes::wide::{bits, product, repeated, spread};
 
 type Vector<S> = [f32x16<S>; 3];
@@ -60,13 +60,68 @@ fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vector<S> {
 fn is_beside<S: Simd>(own: &[Vector<S>; 3], other: &[Vector<S>; 3], slack: f32) -> mask32x16<S> {
     let [p, q, r] = own;
     let (e, f) = (sub(q, p), sub(r, p));
-    let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+    let n = cross(&e, &f);
     let [x, y, z] = [sub(&other[0], p), sub(&other[1], p), sub(&other[2], p)];
     let [dx, dy, dz] = [product(n, x), product(n, y), product(n, z)];
     let far = size(&x).max(size(&y)).max(size(&z));
     let off = (size(&n) * 1.5 + (size(&e) + size(&f) + 2.0 * slack) * far * 6.0) * slack;
     let (low, high) = (dx.min(dy).min(dz), dx.max(dy).max(dz));
     low.simd_gt(off) | high.simd_lt(-off)
+}
+
+/// Returns a lower bound on the distance of each pair of triangles, in a's stored frame; 0 where they
+/// may meet. Lanes are those of [`may_meet`].
+pub(crate) fn least_distances(
+    level: Level,
+    blocks: [&TriangleBlock; 2],
+    relative: &Relative,
+) -> [f32; LEAF_TRIANGLES * LEAF_TRIANGLES] {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || least_distances_by(simd, blocks, relative),
+    ))
+}
+
+#[inline(always)]
+fn least_distances_by<S: Simd>(
+    simd: S,
+    blocks: [&TriangleBlock; 2],
+    relative: &Relative,
+) -> [f32; LEAF_TRIANGLES * LEAF_TRIANGLES] {
+    let [a, b] = in_lanes(simd, blocks, relative);
+    let centres = |t: &[Vector<S>; 3]| [0, 1, 2].map(|k| t[0][k] + t[1][k] + t[2][k]);
+    let gap = gap_along(simd, &a, &b, sub(&centres(&b), &centres(&a)))
+        .max(gap_along(simd, &a, &b, normal(&a)))
+        .max(gap_along(simd, &a, &b, normal(&b)));
+    // Coordinates are off by δ, so the gap along a direction is off by 2√3 δ, and by less than 1e-6
+    // of itself because the direction is a unit vector up to rounding only.
+    (gap * (1.0 - 1e-5) - 6.0 * relative.slack()).max(0.0).to_array()
+}
+
+/// Returns the gap of two triangles along a direction, of any length.
+#[inline(always)]
+fn gap_along<S: Simd>(simd: S, a: &[Vector<S>; 3], b: &[Vector<S>; 3], way: Vector<S>) -> f32x16<S> {
+    // The tiny number keeps a vanishing direction from becoming NaN; it then bounds nothing.
+    let per_length = f32x16::splat(simd, 1.0) / (product(way, way) + 1e-30).sqrt();
+    let way = [way[0] * per_length, way[1] * per_length, way[2] * per_length];
+    // Relative to a corner, where rounding is least.
+    let p = &a[0];
+    let [q, r] = [product(way, sub(&a[1], p)), product(way, sub(&a[2], p))];
+    let [u, v, w] = [product(way, sub(&b[0], p)), product(way, sub(&b[1], p)), product(way, sub(&b[2], p))];
+    let zero = f32x16::splat(simd, 0.0);
+    let (low_a, high_a) = (q.min(r).min(zero), q.max(r).max(zero));
+    let (low_b, high_b) = (u.min(v).min(w), u.max(v).max(w));
+    (low_b - high_a).max(low_a - high_b)
+}
+
+#[inline(always)]
+fn normal<S: Simd>([p, q, r]: &[Vector<S>; 3]) -> Vector<S> {
+    cross(&sub(q, p), &sub(r, p))
+}
+
+#[inline(always)]
+fn cross<S: Simd>(e: &Vector<S>, f: &Vector<S>) -> Vector<S> {
+    [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]
 }
 
 #[inline(always)]
