@@ -19,6 +19,7 @@ pub use descent::{
 };
 pub use mesh::block::{LEAF_TRIANGLES, TriangleBlock};
 pub use mesh::build::{MeshHierarchy, MeshView};
+pub use mesh::cells::CELLS;
 pub use mesh::data::{DroppedTriangles, MeshMeta};
 pub use mesh::options::{MeshBuildError, MeshBuildOptions};
 pub use patch::covering::Covering;

@@ -2,6 +2,7 @@
 
 pub(crate) mod block;
 pub(crate) mod build;
+pub(crate) mod cells;
 pub(crate) mod data;
 pub(crate) mod extents;
 pub(crate) mod moments;

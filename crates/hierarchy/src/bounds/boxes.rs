@@ -143,7 +143,8 @@ impl Relative {
 
     /// Transforms four directions of b's frame to a's.
     #[inline(always)]
-    pub(crate) fn directions_of_four<S: Simd>(&self, v: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    #[must_use]
+    pub fn directions_of_four<S: Simd>(&self, v: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
         turned(&self.rotation, v)
     }
 

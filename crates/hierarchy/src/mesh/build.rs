@@ -9,6 +9,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::mesh::block::{LEAF_TRIANGLES, TriangleBlock};
+use crate::mesh::cells::filled_cells;
 use crate::mesh::data::{DroppedTriangles, MeshArrays, MeshMeta};
 use crate::mesh::extents::boxes_of_triangles;
 use crate::mesh::moments::axes_of_nodes;
@@ -120,6 +121,7 @@ impl MeshHierarchy {
             vertices: &self.arrays.vertices,
             triangles: &self.arrays.triangles,
             source: &self.arrays.source,
+            cells: &self.arrays.cells,
             ball: &self.meta.ball,
         }
     }
@@ -138,6 +140,9 @@ pub struct MeshView<'a> {
     pub triangles: &'a [[u32; 3]],
     /// The index of each triangle in the caller's mesh.
     pub source: &'a [u32],
+    /// The number of well-filled cells of each node, of [`CELLS`](crate::CELLS); empty if they were
+    /// not counted.
+    pub cells: &'a [u8],
     /// A ball around the mesh, in the stored frame.
     pub ball: &'a Ball,
 }
@@ -200,6 +205,7 @@ fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarch
     let mut packed = vec![Siblings::NONE; topology.inner()];
     siblings(&topology, &boxes, &mut packed);
 
+    let cells = if options.cells { filled_cells(&topology, &boxes, &blocks) } else { Vec::new() };
     let (vertices, triangles) = in_order(&clean, &items);
     let source: Vec<u32> = items.iter().map(|item| clean.sources()[item.index as usize]).collect();
     let root = Root { bounds: boxes[0], ..Root::default() };
@@ -216,6 +222,7 @@ fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarch
         vertices: vertices.into(),
         triangles: triangles.into(),
         source: source.into(),
+        cells: cells.into(),
     };
     let mut mesh = MeshHierarchy { meta, topology, arrays };
     mesh.meta.identity = mesh.hashed();

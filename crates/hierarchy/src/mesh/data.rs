@@ -47,6 +47,8 @@ pub(crate) struct MeshArrays {
     pub(crate) triangles: Array<[u32; 3]>,
     /// The indices of the triangles in the input.
     pub(crate) source: Array<u32>,
+    /// The well-filled cells of each node; empty if they were not counted.
+    pub(crate) cells: Array<u8>,
 }
 
 impl MeshArrays {
@@ -57,6 +59,7 @@ impl MeshArrays {
         writer.section(*b"VERT", 0, &self.vertices)?;
         writer.section(*b"TRIS", 0, &self.triangles)?;
         writer.section(*b"SRCE", 0, &self.source)?;
+        writer.section(*b"CELL", 0, &self.cells)?;
         Ok(())
     }
 
@@ -68,6 +71,7 @@ impl MeshArrays {
             vertices: file.array(*b"VERT", 0)?,
             triangles: file.array(*b"TRIS", 0)?,
             source: file.array(*b"SRCE", 0)?,
+            cells: file.array(*b"CELL", 0)?,
         })
     }
 }

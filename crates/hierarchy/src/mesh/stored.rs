@@ -8,6 +8,7 @@ use nearmiss_store::{Check, File, Flaw, LoadError, WriteError, Writer};
 use crate::file::sanity::{check_boxes, frame_is_valid, is_in_range};
 use crate::mesh::block::{LEAF_TRIANGLES, TriangleBlock};
 use crate::mesh::build::MeshHierarchy;
+use crate::mesh::cells::CELLS;
 use crate::mesh::data::{MeshArrays, MeshMeta};
 use crate::scan::outline::Ball;
 use crate::tree::topology::Topology;
@@ -53,6 +54,9 @@ impl MeshHierarchy {
         Flaw::length("boxes", arrays.siblings.len(), topology.inner())?;
         Flaw::length("leaves", arrays.blocks.len(), topology.leaves())?;
         Flaw::length("source", arrays.source.len(), self.len())?;
+        if !arrays.cells.is_empty() {
+            Flaw::length("cells", arrays.cells.len(), topology.len())?;
+        }
         let Aabb { min, max } = self.meta.bounds;
         let what = if !frame_is_valid(&self.meta.frame) {
             "the frame of the stored positions"
@@ -83,6 +87,8 @@ impl MeshHierarchy {
             "the place in the input of triangle",
             self.arrays.source.iter().position(|s| s >= given),
         )?;
+        let wrong = self.arrays.cells.iter().position(|&count| !(1..=CELLS).contains(&count));
+        Flaw::first("the number of filled cells of node", wrong)?;
         if *bounds != Aabb::of(vertices.iter().copied()) || *frame != Frame::around(bounds.min, bounds.max) {
             return Err(Flaw::Metadata { what: "the box of bounds" });
         }

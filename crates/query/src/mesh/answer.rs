@@ -13,9 +13,9 @@ pub enum MeshVerdict {
     Intersecting(MeshContact),
     /// No two triangles share a point.
     Separated,
-    /// A budget ended the search before it was decided. The likelihood of the answer says which
-    /// verdict is more probable.
-    Undecided,
+    /// The search stopped above the leaves, because enough pairs of nodes are likely to collide or
+    /// because a budget was spent. The likelihood of the answer says which verdict is more probable.
+    Undecided(ContactRegion),
     /// A pose is invalid: it is not finite, not a rotation or has no positive scale.
     Pose,
 }
@@ -48,11 +48,31 @@ pub struct MeshContact {
     pub triangles: [u32; 2],
 }
 
+/// Where two meshes are most likely to meet, in the world.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ContactRegion {
+    /// The centre of the intersection of the bounding volumes that are most likely to hold a contact.
+    pub centre: [f64; 3],
+    /// The radius of a ball about the centre that contains the intersection.
+    pub radius: f64,
+}
+
 /// A verdict about two meshes and its cost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MeshAnswer {
     /// The verdict.
     pub verdict: MeshVerdict,
+    /// The probability that the meshes meet: 1 or 0 if it is decided, otherwise an estimate.
+    pub likelihood: f64,
     /// The cost: node pairs compared, and leaf pairs whose triangles were compared.
     pub statistics: Statistics,
+}
+
+impl MeshAnswer {
+    /// Returns `true` if the meshes meet or are more likely to meet than not: the best answer to a
+    /// query that may be cut short.
+    #[must_use]
+    pub fn likely_meets(&self) -> bool {
+        self.likelihood >= 0.5
+    }
 }

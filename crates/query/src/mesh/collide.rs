@@ -2,12 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use nearmiss_hierarchy::{BoxVisitor, Open, PairVisitor, Plunging, Stack, descend};
+use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Plunging, Stack, descend};
 use nearmiss_lanes::wide::Bits;
 use nearmiss_mesh::triangles_meet;
 
 use crate::mesh::answer::{MeshAnswer, MeshContact, MeshVerdict};
 use crate::mesh::mesh_pair::MeshPairing;
+use crate::mesh::region::region;
 
 /// A search for triangles that meet.
 struct Search<'s, 'a> {
@@ -64,12 +65,12 @@ pub(crate) fn collide(
     if let Some(hint) = hint {
         *hint = search.met.map(|met| met.map(nearmiss_lanes::id32));
     }
-    let verdict = match search.met.and_then(|met| search.pair.contact(met)) {
-        Some(contact) => MeshVerdict::Intersecting(contact),
-        None if ended => MeshVerdict::Undecided,
-        None => MeshVerdict::Separated,
+    let (verdict, likelihood) = match search.met.and_then(|met| search.pair.contact(met)) {
+        Some(contact) => (MeshVerdict::Intersecting(contact), 1.0),
+        None if ended => (MeshVerdict::Undecided(region(&search.pair, NodePair::ROOTS)), 0.5),
+        None => (MeshVerdict::Separated, 0.0),
     };
-    MeshAnswer { verdict, statistics: search.pair.meter.spent }
+    MeshAnswer { verdict, likelihood, statistics: search.pair.meter.spent }
 }
 
 impl Search<'_, '_> {

@@ -1,16 +1,18 @@
 //! A pair of placed meshes and the questions about it.
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::Stack;
+use nearmiss_hierarchy::{Heap, Stack};
 
 use crate::ask::answer::Statistics;
 use crate::ask::budget::Budget;
 use crate::distance::Frontier;
 use crate::mesh::answer::{MeshAnswer, MeshContact, MeshVerdict};
+use crate::mesh::cell_table::{CellTable, MOST_SHARED};
 use crate::mesh::collide::collide;
 use crate::mesh::distance::{MeshDistance, distance};
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::placed::PlacedMesh;
+use crate::mesh::time_critical;
 
 /// Working memory of queries about meshes, one per thread. Reuse it: a query does not allocate once
 /// its scratch is warm. It holds no answers and never changes one.
@@ -19,6 +21,8 @@ pub struct MeshScratch {
     level: Level,
     stack: Stack,
     open: Frontier,
+    heap: Heap,
+    table: Option<CellTable>,
 }
 
 impl Default for MeshScratch {
@@ -32,7 +36,46 @@ impl MeshScratch {
     /// available ones, for comparisons. Answers do not depend on it.
     #[must_use]
     pub fn by_level(level: Level) -> Self {
-        Self { level, stack: Stack::default(), open: Frontier::default() }
+        Self { level, stack: Stack::default(), open: Frontier::default(), heap: Heap::default(), table: None }
+    }
+}
+
+/// The quality at which a time-critical query may stop (Klein & Zachmann, slides, 2003).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct MeshQuality {
+    /// The probability from which on a pair of nodes counts as colliding, p_min. 1, the default, to
+    /// stop only at two triangles that meet.
+    pub p_min: f64,
+    /// The number of such pairs at which the search stops, k_min. Default: 10.
+    pub k_min: u32,
+    /// The number of cells that both surfaces must fill in a collision, 1 to 16. Default: 4.
+    pub shared: u32,
+}
+
+impl Default for MeshQuality {
+    fn default() -> Self {
+        Self { p_min: 1.0, k_min: 10, shared: 4 }
+    }
+}
+
+impl MeshQuality {
+    /// The same quality with this probability.
+    #[must_use]
+    pub const fn with_p_min(self, p_min: f64) -> Self {
+        Self { p_min, ..self }
+    }
+
+    /// The same quality with this number of pairs.
+    #[must_use]
+    pub const fn with_k_min(self, k_min: u32) -> Self {
+        Self { k_min, ..self }
+    }
+
+    /// The same quality with this number of cells.
+    #[must_use]
+    pub const fn with_shared(self, shared: u32) -> Self {
+        Self { shared, ..self }
     }
 }
 
@@ -96,10 +139,28 @@ impl<'a> MeshPair<'a> {
     }
 
     /// Decides whether a triangle of a and a triangle of b share a point. Exact without a budget;
-    /// touching counts. Does not allocate once `scratch` is warm.
+    /// touching counts. With a budget of work or time, the most probable pairs of nodes come first.
+    /// Does not allocate once `scratch` is warm.
     pub fn collide(&self, scratch: &mut MeshScratch) -> MeshAnswer {
+        if self.budget.may_end() {
+            return self.collide_likely(&MeshQuality::default(), scratch);
+        }
         let MeshScratch { level, stack, .. } = scratch;
         self.ask(*level, |pair| collide(pair, stack, None, None)).unwrap_or(INVALID)
+    }
+
+    /// Decides whether the meshes meet as well as `quality` asks for, and as the budget allows: the
+    /// most probable pair of nodes first, until enough of them are probable enough.
+    ///
+    /// A separation is exact, and so is a contact of two triangles. Otherwise the verdict is
+    /// [`MeshVerdict::Undecided`], with the likelihood of a contact and where it is likeliest.
+    pub fn collide_likely(&self, quality: &MeshQuality, scratch: &mut MeshScratch) -> MeshAnswer {
+        if scratch.table.as_ref().is_none_or(|table| table.shared() != quality.shared) {
+            scratch.table = Some(CellTable::new(quality.shared.clamp(1, MOST_SHARED)));
+        }
+        let MeshScratch { level, heap, table, .. } = scratch;
+        let Some(table) = table else { return INVALID };
+        self.ask(*level, |pair| time_critical::collide(pair, quality, table, heap)).unwrap_or(INVALID)
     }
 
     /// Like [`Self::collide`], but tries the triangles of `hint` first, and updates it.
@@ -145,7 +206,7 @@ impl<'a> MeshPair<'a> {
 }
 
 /// The answer for an invalid pose.
-const INVALID: MeshAnswer = MeshAnswer { verdict: MeshVerdict::Pose, statistics: NOTHING };
+const INVALID: MeshAnswer = MeshAnswer { verdict: MeshVerdict::Pose, likelihood: 0.5, statistics: NOTHING };
 
 /// The distance for an invalid pose.
 const UNKNOWN: MeshDistance = MeshDistance {
