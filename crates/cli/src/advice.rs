@@ -84,8 +84,8 @@ fn of_spacing(scan: &Scan, health: &Health) -> Option<String> {
     } else {
         let (even, less) = (short_up(0.5 * uneven.spacing), short_up(4.0 * uneven.median));
         format!(
-            "{told}, so answers near them are accurate to {} only; use `preprocess --reach {less}` to bridge smaller \
-             gaps, or `preprocess --voxel {even}` to even out the spacing",
+            "{told}, so answers near them are accurate to {} only; use `preprocess --reach {less}` to bridge no \
+             wider gaps, or `preprocess --voxel {even}` to even out the spacing",
             rough(uneven.spacing)
         )
     })

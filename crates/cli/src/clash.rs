@@ -11,7 +11,7 @@ use clap::Args;
 use nearmiss::{Budget, ClashOptions, ClashPlan, Pair, Scan, Scratch};
 
 use crate::console::{Console, Results, now};
-use crate::contacts::check_outputs;
+use crate::contacts::{SHOWN, check_outputs};
 use crate::distance::beside;
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -64,9 +64,6 @@ pub struct ClashArgs {
     #[arg(long)]
     pub quiet: bool,
 }
-
-/// The most clashes printed for people; files and JSON hold all.
-const SHOWN: usize = 40;
 
 pub(crate) fn run(args: &ClashArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);

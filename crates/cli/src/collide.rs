@@ -236,7 +236,8 @@ impl Question {
         if let Some((all, grouped)) = &grouped {
             grouped.lines(all, unit([&a, &b])).iter().try_for_each(|line| results.line(line))?;
         }
-        report.contacts().chain(report.manifold()).try_for_each(|contact| results.line(contact))
+        let unit = unit([&a, &b]);
+        report.contacts(unit).chain(report.manifold(unit)).try_for_each(|contact| results.line(contact))
     }
 }
 
@@ -368,7 +369,7 @@ fn conclude(question: &Question, args: &CollideArgs, out: &mut Outputs<'_, '_, '
         return Ok(());
     }
     let unit = question.a.sampling_radius().min(question.b.sampling_radius()) / 100.0;
-    out.results.line(log.summary(unit))
+    out.results.line(log.summary(unit, args.margin))
 }
 
 /// Opens both scans. Scans with different kernels may be mixed for `--thickened`, which uses no

@@ -14,6 +14,9 @@ use crate::error::CliError;
 use crate::output;
 use crate::parse::parse_radius;
 
+/// The most clashes or contacts printed for people; files and JSON hold all.
+pub(crate) const SHOWN: usize = 40;
+
 /// Options for the contacts that were found.
 #[derive(Debug, Clone, Args)]
 pub struct ContactArgs {

@@ -135,7 +135,7 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
             question.answer_all(poses, &mut log, &mut results)?;
             log.draw(&args.path, &names(inputs), 0.0)?;
             let unit = a.sampling_radius().min(b.sampling_radius()) / 100.0;
-            if args.json { Ok(()) } else { results.line(log.summary(unit)) }
+            if args.json { Ok(()) } else { results.line(log.summary(unit, 0.0)) }
         })?,
         None => {
             let poses = posing::of_options(&matrices, question.scans)?;

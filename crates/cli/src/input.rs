@@ -24,6 +24,10 @@ const LONG_SHARE: f64 = 0.05;
 /// The length of a long edge, in sampling radii.
 const LONG: f64 = 3.0;
 
+/// A warning is given if the sampling radius of a mesh's vertices exceeds this share of the mesh's
+/// diagonal. The vertices of a sphere with 200 vertices reach it.
+const COARSE: f64 = 0.1;
+
 /// The largest length of a line of text, in bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
@@ -210,7 +214,16 @@ pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Resul
     check_step(path, &scan);
     let radius = scan.sampling_radius();
     let share = share_of_long_faces(model, LONG * radius);
-    if share > LONG_SHARE {
+    let diagonal = 2.0 * scan.bounds().half_extents().iter().map(|half| half * half).sum::<f64>().sqrt();
+    if model.mesh.is_some() && radius > COARSE * diagonal {
+        console::warn(format_args!(
+            "{}: the vertices of this mesh are about {} apart, but the mesh is only {} long; only vertices become \
+             points, so answers are as coarse as that; put points on the faces with `sample`",
+            path.display(),
+            short(radius),
+            short(diagonal),
+        ));
+    } else if share > LONG_SHARE {
         console::warn(format_args!(
             "{}: {:.0} % of the mesh's surface is in faces with edges longer than {LONG} sampling radii ({}), and the \
              scan has holes there because only vertices become points; put points on the faces with `sample`",

@@ -118,12 +118,17 @@ impl<'a> PathLog<'a> {
         }
     }
 
-    /// Returns the summary as a sentence, with points rounded to `unit`.
-    pub(crate) fn summary(&self, unit: f64) -> String {
+    /// Returns the summary as a sentence, with points rounded to `unit`. `margin` is that of the
+    /// queries.
+    pub(crate) fn summary(&self, unit: f64, margin: f64) -> String {
         let [apart, unknown, touching] = self.counts;
         let total = count(apart + unknown + touching, "pose");
         let first = self.first.as_ref().map(|first| format!(" (first on {})", first.where_found(unit)));
-        let verb = if touching == 1 { "touches" } else { "touch" };
+        let verb = match touching {
+            _ if margin > 0.0 => format!("within {}", short(margin)),
+            1 => "touches".to_owned(),
+            _ => "touch".to_owned(),
+        };
         let counts = [
             (touching, format!("{verb}{}", first.unwrap_or_default())),
             (apart, "apart".to_owned()),
@@ -134,7 +139,7 @@ impl<'a> PathLog<'a> {
         let mut text = format!("{total}: {}.", counts.join(", "));
         if let Some(PathEntry { clearance: Some(bounds), .. }) = &self.least {
             let where_found = self.least.as_ref().map(|least| least.where_found(unit)).unwrap_or_default();
-            text += &format!(" Smallest clearance without contact: {}, on {where_found}.", between(*bounds));
+            text += &format!(" Smallest clearance of those apart: {}, on {where_found}.", between(*bounds));
         }
         text
     }

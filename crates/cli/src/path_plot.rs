@@ -85,7 +85,7 @@ impl PathPlot<'_> {
                 place(end)
             ));
         }
-        drawing.legend();
+        drawing.legend(self.margin);
         drawing.finish()
     }
 }
@@ -216,12 +216,12 @@ impl Drawing {
         }
     }
 
-    fn legend(&mut self) {
+    fn legend(&mut self, margin: f64) {
         let [apart, touch, undecided] =
             [PathVerdict::Separated, PathVerdict::Intersecting, PathVerdict::Undecided].map(colour);
         let entries = [
             (apart, 1.0, "apart"),
-            (touch, 1.0, "touch"),
+            (touch, 1.0, if margin > 0.0 { "within margin" } else { "touch" }),
             (undecided, 1.0, "undecided"),
             (CLEARANCE, 0.5, "clearance, between its bounds; lengths in world units"),
         ];

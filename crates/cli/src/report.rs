@@ -7,8 +7,8 @@ use nearmiss::{
 };
 use serde::Serialize;
 
-use crate::contacts::{GroupReport, Grouped};
-use crate::digits::{bytes, count, counts, percent, place, short, work};
+use crate::contacts::{GroupReport, Grouped, SHOWN};
+use crate::digits::{bytes, count, counts, percent, place, rough, short, work};
 use crate::filters::Filtered;
 use crate::health::Health;
 
@@ -424,25 +424,32 @@ impl AnswerReport {
         self
     }
 
-    /// Returns a line of text for each point of the manifold, if there is one.
-    pub(crate) fn manifold(&self) -> impl Iterator<Item = String> {
-        self.manifold.iter().flatten().map(|place| {
-            let ([x, y, z], [u, v, w]) = (place.point, place.normal);
-            let gap = if place.gap < 0.0 { "penetration depth" } else { "gap" };
-            format!("  ({x}, {y}, {z}), {gap} {:.4e}, push a along ({u:.4}, {v:.4}, {w:.4})", place.gap.abs())
+    /// Returns a line of text for each point of the manifold, if there is one. Places are rounded
+    /// to `unit`.
+    pub(crate) fn manifold(&self, unit: f64) -> impl Iterator<Item = String> {
+        self.manifold.iter().flatten().map(move |found| {
+            let [u, v, w] = found.normal;
+            let what = if found.gap < 0.0 { "penetration depth" } else { "gap" };
+            let (at, gap) = (place(found.point, unit), short(found.gap.abs()));
+            format!("  {at}, {what} {gap}, push a along ({u:.4}, {v:.4}, {w:.4})")
         })
     }
 
-    /// Returns a line of text for each contact, if all were searched for.
-    pub(crate) fn contacts(&self) -> impl Iterator<Item = String> {
-        self.contacts.iter().flatten().map(|contact| {
-            let [x, y, z] = contact.point;
+    /// Returns a line of text for each of the first contacts, if all were searched for, and a line
+    /// about the others. Places are rounded to `unit`.
+    pub(crate) fn contacts(&self, unit: f64) -> impl Iterator<Item = String> {
+        let contacts = self.contacts.as_deref().unwrap_or_default();
+        let lines = contacts.iter().take(SHOWN).map(move |contact| {
             let (a, b) = (contact.source_a, contact.source_b);
             format!(
-                "  ({x}, {y}, {z}), between point {a} of a and point {b} of b, residual {:.2e}",
-                contact.residual
+                "  {}, between point {a} of a and point {b} of b, residual {}",
+                place(contact.point, unit),
+                rough(contact.residual)
             )
-        })
+        });
+        let others = contacts.len().saturating_sub(SHOWN) as u64;
+        let rest = format!("  … and {}; --csv, --ply and --json hold all", count(others, "other contact"));
+        lines.chain((others > 0).then_some(rest))
     }
 
     /// Returns a line of text with the points of a contact and the work of the search.

@@ -64,7 +64,11 @@ pub struct Spot(
     pub [f64; 3],
 );
 
+/// Reads a place as people write it or as answers print it: `x,y,z`, in brackets or without.
 pub(super) fn parse_spot(text: &str) -> Result<Spot, String> {
+    let text = text.trim();
+    let bare = [('[', ']'), ('(', ')')].map(|(open, close)| text.strip_prefix(open)?.strip_suffix(close));
+    let text = bare.into_iter().flatten().next().unwrap_or(text);
     let numbers: Vec<f64> =
         pieces(text).map_while(|piece| piece.parse().ok().filter(|x: &f64| x.is_finite())).collect();
     match <[f64; 3]>::try_from(numbers) {

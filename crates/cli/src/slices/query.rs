@@ -191,8 +191,8 @@ fn micros(start: std::time::Instant) -> f64 {
 fn sentence(found: &Occupancy) -> String {
     let what = match (found.collides, found.obstacle) {
         (false, _) => "Free".to_owned(),
-        (true, true) => format!("Obstacles among {}", count(found.pixels, "pixel")),
-        (true, false) => format!("No obstacle, {}", count(found.pixels, "pixel")),
+        (true, true) => format!("Occupied in {}, with obstacles", count(found.pixels, "pixel")),
+        (true, false) => format!("Occupied in {}, without obstacles", count(found.pixels, "pixel")),
     };
     match found.floor {
         Some(floor) => format!("{what}; the floor below is at {}.", short(floor)),

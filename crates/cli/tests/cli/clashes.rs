@@ -119,6 +119,14 @@ fn all_contacts_are_counted_grouped_and_written() {
     }
     let people = place.ok(&asked).results;
     assert!(people.contains(&format!("{} contacts in 1 clash (", contacts.len())), "{people}");
+    let listed = |text: &str| text.lines().filter(|line| line.contains(", residual ")).count();
+    assert_eq!(listed(&people), contacts.len(), "{people}");
+
+    // Of many contacts people see the first; places are rounded.
+    let people = place.ok(&[&asked[..6], &["--margin", "0.5"]].concat()).results;
+    assert_eq!(listed(&people), 40, "{people}");
+    assert!(people.ends_with(" other contacts; --csv, --ply and --json hold all\n"), "{people}");
+    assert!(people.lines().all(|line| line.chars().count() < 160), "{people}");
 
     // Without a link every contact is alone.
     let alone = place.ok(&[&asked[..6], &["--link", "0", "--json"]].concat()).json();

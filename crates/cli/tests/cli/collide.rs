@@ -271,7 +271,7 @@ fn a_file_of_poses_is_answered_in_order() {
     assert!(last.starts_with("line 2501: "), "one line is blank: {last}");
     let words = "2500 poses: 834 touch (first on line 1, at (0.7";
     assert!(summary.starts_with(words), "{summary}");
-    assert!(summary.contains("), 1666 apart. Smallest clearance without contact: between 0.3"), "{summary}");
+    assert!(summary.contains("), 1666 apart. Smallest clearance of those apart: between 0.3"), "{summary}");
 }
 
 #[test]

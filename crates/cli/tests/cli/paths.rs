@@ -131,11 +131,16 @@ fn a_path_is_summed_up_tabled_and_drawn() {
             assert!(lower <= truth + 0.02 && upper >= truth - 0.12 && upper <= truth + 0.05, "{row:?}");
         }
         let least = rows[first - 1][6].parse::<f64>().unwrap();
-        assert!(summary.contains("Smallest clearance without contact: "), "{summary}");
+        assert!(summary.contains("Smallest clearance of those apart: "), "{summary}");
         assert!(summary.contains(&format!(", on line {}, time", first - 1)), "{summary}, {least}");
         let plot = std::fs::read_to_string(place.path("t.svg")).unwrap();
         assert!(plot.starts_with("<svg") && plot.contains("time 14.5") && !plot.contains("NaN"), "{plot}");
     }
+    // With a margin, poses within it are not said to touch.
+    let near = ["collide", "ball.nm", "ball.nm", "--poses", "path.tum", "--margin", "0.3", "--plot", "m.svg"];
+    let summary = place.ok(&near).results.lines().last().unwrap().to_owned();
+    assert!(summary.contains(" within 0.3 (first on line ") && !summary.contains("touch"), "{summary}");
+    assert!(std::fs::read_to_string(place.path("m.svg")).unwrap().contains(">within margin<"));
     let refused = ["collide", "ball.nm", "ball.nm", "--poses", "path.tum", "--plot", "t.png"];
     place.refused(2, &refused, &["--plot: expected a name that ends in .svg, got `t.png`"]);
 }

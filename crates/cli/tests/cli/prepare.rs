@@ -362,6 +362,14 @@ fn what_is_dropped_is_counted_and_large_faces_are_warned_about() {
     let done = place.ok(&["preprocess", "large.obj", "-o", "large.nm", "--json"]);
     assert!(done.errors.starts_with("warning: large.obj: 100 % of the mesh's surface"), "{}", done.errors);
     assert_eq!(done.json().len(), 1, "results stay clean");
+
+    // A beam of eight vertices: no edge is long beside their spacing.
+    let corner = |i: u8| format!("v {} {} {}\n", 6 * (i & 1), i >> 1 & 1, i >> 2);
+    let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+    place.write("beam.obj", (0..8).map(corner).collect::<String>() + faces);
+    let done = place.ok(&["clash", "odd.xyz", "beam.obj"]);
+    let warning = "warning: beam.obj: the vertices of this mesh are about ";
+    assert!(done.errors.starts_with(warning) && done.errors.contains("`sample`"), "{}", done.errors);
 }
 
 #[test]

@@ -33,8 +33,11 @@ fn a_place_to_start_serves() {
     let people = place.ok(&["slices", "start", "house", "--near", "9,6.5,0.1"]).results;
     assert!(people.starts_with("Nearest place to stand: [") && people.ends_with(" away.\n"), "{people}");
     // What people read serves as well.
-    let spot = people.split(['[', ']']).nth(1).unwrap().replace(' ', "");
-    told(&place, &["reach", "house", &format!("--start={spot}")]);
+    let spot = people.split(['[', ']']).nth(1).unwrap();
+    for spot in [spot.replace(' ', ""), spot.to_owned(), format!("[{spot}]"), format!("({spot})")] {
+        told(&place, &["reach", "house", "--start", &spot]);
+    }
+    place.refused(2, &["slices", "reach", "house", "--start", "[1,2,3"], &["expected three numbers"]);
     let people = place.ok(&["slices", "start", "house"]).results;
     assert!(people.starts_with("A place to start: ["), "{people}");
 }

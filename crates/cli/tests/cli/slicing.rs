@@ -207,7 +207,7 @@ fn boxes_and_objects_are_answered() {
     );
     let people = place.ok(&["slices", "query", "house", "--boxes", "boxes.jsonl"]).results;
     assert!(people.starts_with("Free; the floor below is at "), "{people}");
-    assert!(people.contains("Obstacles among "), "{people}");
+    assert!(people.contains("Occupied in ") && people.contains(", with obstacles; "), "{people}");
 
     let crate_corners: Vec<[f64; 3]> =
         (0..8_u8).map(|i| [0, 1, 2].map(|k| f64::from(i >> k & 1) * 0.5)).collect();
