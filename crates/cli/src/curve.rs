@@ -69,7 +69,7 @@ pub struct CurveArgs {
 
 fn parse_length(text: &str) -> Result<f64, String> {
     let length = text.parse().ok().filter(|l: &f64| *l > 0.0 && l.is_finite());
-    length.ok_or_else(|| "expected a length of more than zero, in world units".into())
+    length.ok_or_else(|| "expected a length above 0, in world units".into())
 }
 
 /// The JSON output of `curve`.
@@ -228,10 +228,10 @@ fn sentence(found: &Curves) -> String {
     let mut text = match (parts.is_empty(), touching) {
         (true, 0) => return "No curve found.".to_owned(),
         (true, _) => format!("They touch in {}", count(touching as u64, "point")),
-        (false, 0) => format!("They cut each other in {}", parts.join(" and ")),
+        (false, 0) => format!("They intersect in {}", parts.join(" and ")),
         (false, _) => {
             format!(
-                "They cut each other in {} and touch in {}",
+                "They intersect in {} and touch in {}",
                 parts.join(" and "),
                 count(touching as u64, "point")
             )

@@ -50,8 +50,9 @@ const OPACITY: f64 = 0.6;
 pub(crate) fn check_name(path: &Path) -> Result<(), CliError> {
     match path.extension() {
         Some(extension) if !extension.eq_ignore_ascii_case("png") => Err(CliError::Usage(format!(
-            "{}: pictures are PNG; name a file that ends in .png",
-            path.display()
+            "{}: expected a file name that ends in .png, got .{}; pictures are PNG files",
+            path.display(),
+            extension.display()
         ))),
         _ => Ok(()),
     }
@@ -123,10 +124,10 @@ pub(crate) fn paint(views: [&Placed<'_>; 2], answer: &Answer, style: &Style) -> 
     let sure = |evidence| if evidence == Evidence::Certified { "certified" } else { "estimated" };
     let told = match answer.verdict {
         Verdict::Intersecting { evidence, .. } => {
-            format!("They touch at the ringed place ({}). {}", sure(evidence), close_told(style.points))
+            format!("They touch at the ringed point ({}). {}", sure(evidence), close_told(style.points))
         }
         Verdict::Separated { evidence, .. } => format!("They do not touch ({}).", sure(evidence)),
-        Verdict::Undecided(_) => "Whether they touch is undecided.".to_owned(),
+        Verdict::Undecided(_) => "It is undecided whether they touch.".to_owned(),
     };
     legend(&mut canvas, &told, &style.names);
     canvas.picture()
@@ -137,7 +138,7 @@ fn close_told(points: bool) -> &'static str {
     if points {
         "The close view shows the two points whose balls meet, and the line between them."
     } else {
-        "The close view is cut open there, dark along the cut; arrows are normals of the surfaces."
+        "The close view is cut open there, dark along the cut. The arrows are normals of the surfaces."
     }
 }
 

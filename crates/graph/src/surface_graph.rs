@@ -321,14 +321,14 @@ impl SurfaceGraph {
         let count = radii.len();
         let points = PointGraph::load(file, meta.points, count, check)?;
         let confidence: Array<u8> = file.array(CONFIDENCE, 0)?;
-        Flaw::length("the confidence of normals", confidence.len(), count)?;
+        Flaw::length("confidences of normals", confidence.len(), count)?;
         let parts: Array<StoredPart> = file.array(PARTS, 0)?;
         let is_sound = |part: &StoredPart| {
             let known = part.flags as usize >> 1 < DECISIONS.len();
             known && points.components().get(part.first as usize) == Some(&part.first)
         };
         if let Some(index) = parts.iter().position(|part| !is_sound(part)) {
-            return Err(Flaw::Value { what: "the side of part", index }.into());
+            return Err(Flaw::Value { what: "the orientation of part", index }.into());
         }
         if check == Check::Full {
             check_parts(&parts, points.components())?;
@@ -369,5 +369,5 @@ fn check_parts(parts: &[StoredPart], components: &[u32]) -> Result<(), Flaw> {
         return Err(Flaw::Value { what: "part", index });
     }
     let (found, expected) = (parts.len(), expected.count());
-    if found == expected { Ok(()) } else { Err(Flaw::Length { array: "the list of parts", found, expected }) }
+    if found == expected { Ok(()) } else { Err(Flaw::Length { array: "parts", found, expected }) }
 }

@@ -122,17 +122,17 @@ const REPRESENTABLE: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
 #[non_exhaustive]
 pub enum SurfaceError {
     /// A support radius that is not between 1 and 16 sampling radii.
-    #[error("a horizon of {0} sampling radii; it must lie between 1 and 16")]
+    #[error("expected a support radius of 1 to 16 sampling radii, got {0}")]
     Horizon(f64),
     /// A weight at the support radius that is not between 1e-12 and 0.5.
-    #[error("a weight of {0} at the horizon; it must lie between 1e-12 and 0.5")]
+    #[error("expected a weight of 1e-12 to 0.5 at the support radius, got {0}")]
     Threshold(f64),
     /// A least support below 3, the number of points that span a plane.
-    #[error("a least support of {0}; three points are needed to span a plane")]
+    #[error("expected a minimum support of at least 3 points, got {0}")]
     Support(u32),
     /// A fixed bandwidth that is not positive, or whose square is out of the range of single
     /// precision.
-    #[error("a bandwidth of {0}; it must be positive, and neither vanish nor be boundless beside the scan")]
+    #[error("expected a positive bandwidth comparable to the extent of the scan, got {0}")]
     Bandwidth(f64),
 }
 

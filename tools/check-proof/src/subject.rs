@@ -133,7 +133,7 @@ impl Subject {
     pub(crate) fn check_node(&self, claimed: &Enclosure, semantics: Semantics) -> Result<(), String> {
         let Enclosure { first, count, .. } = *claimed;
         let Some(&id) = self.ids.get(&(first as usize, count as usize)) else {
-            return Err(format!("no node has the points {first} to {first} + {count}"));
+            return Err(format!("expected the points of a node, got {count} from {first}"));
         };
         let slices = self.scan.slices();
         let stored = if semantics == Semantics::Obstacle {
@@ -148,7 +148,9 @@ impl Subject {
         if same {
             Ok(())
         } else {
-            Err(format!("node {id} ({first} to {first} + {count}) has another enclosure"))
+            Err(format!(
+                "expected the stored enclosure of node {id} ({count} points from {first}), got another"
+            ))
         }
     }
 }
@@ -162,26 +164,30 @@ fn rounded(x: f64) -> f64 {
 /// Then the nodes that contain a point are its leaf and that leaf's ancestors.
 fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
     if nodes.first().map(|root| &root.points) != Some(&(0..points)) {
-        return Err("the root has not all points".into());
+        return Err("expected a root with all points, got another".into());
     }
     let mut parents = vec![0_u32; nodes.len()];
     for (id, node) in nodes.iter().enumerate().filter(|(_, node)| !node.children.is_empty()) {
         let mut next = node.points.start;
         for &child in &node.children {
             let Some(own) = nodes.get(child).map(|child| &child.points) else {
-                return Err(format!("node {id} has no children there"));
+                return Err(format!("expected children of node {id} within the tree, got {child}"));
             };
             if own.start != next || own.is_empty() {
-                return Err(format!("node {id} has not the points of its children"));
+                return Err(format!("expected node {id} to have the points of its children, got others"));
             }
             next = own.end;
             parents[child] += 1;
         }
         if next != node.points.end {
-            return Err(format!("node {id} has not the points of its children"));
+            return Err(format!("expected node {id} to have the points of its children, got others"));
         }
     }
-    if parents.iter().skip(1).any(|n| *n != 1) { Err("a node has not one parent".into()) } else { Ok(()) }
+    if parents.iter().skip(1).any(|n| *n != 1) {
+        Err("expected one parent for each node, got another number".into())
+    } else {
+        Ok(())
+    }
 }
 
 /// A node as this checker uses it.
@@ -208,7 +214,7 @@ fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
     let kernel = match options.kernel {
         Kernel::Gaussian => oracle::Kernel::Gaussian { theta: options.threshold },
         Kernel::Wendland => oracle::Kernel::Wendland,
-        other => return Err(format!("there is no naive twin of the kernel {other:?}")),
+        other => return Err(format!("expected the kernel Gaussian or Wendland, got {other:?}")),
     };
     let unit = scan.frame().scale;
     let (reach, radii) = match options.bandwidth {
@@ -216,7 +222,7 @@ fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
         Bandwidth::Global => (options.horizon, vec![scan.sampling_radius() / unit; scan.len()]),
         // The support radius for which the bandwidth is the given one.
         Bandwidth::Fixed(h) => (1.0 / kernel.bandwidth(1.0), vec![h / unit; scan.len()]),
-        other => return Err(format!("there is no naive twin of the bandwidth {other:?}")),
+        other => return Err(format!("expected the bandwidth Local, Global or Fixed, got {other:?}")),
     };
     let points: Vec<[f64; 3]> = scan.positions().iter().map(|p| p.map(f64::from)).collect();
     let least_support = options.support_min as usize;

@@ -123,7 +123,7 @@ fn close_pairs(scan: &Scan, graph: &PointGraph, runs: usize) {
             ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons, paths)
         });
         println!(
-            "* close pairs, paths {paths:?}: {:.0} points/s, {:.2} µs of processor time a point; {:.1} heard at a point, {:.0} \
+            "* close pairs, paths {paths:?}: {:.0} points/s, {:.2} µs of processor time a point; {:.1} close pairs per point, {:.0} \
              bytes a point",
             n / time,
             (processor_time() - spent).as_secs_f64() * 1e6 / n / count(runs),

@@ -160,7 +160,7 @@ fn each_line<L: for<'a> Deserialize<'a>>(
         })?;
         answer(line).map_err(|what| lines.fault(what))??;
     }
-    if is_empty { Err(lines.unfit(format!("holds no lines; {form}"))) } else { Ok(()) }
+    if is_empty { Err(lines.unfit(format!("expected lines, got none; {form}"))) } else { Ok(()) }
 }
 
 /// Returns the object's pose in the building.
@@ -191,8 +191,8 @@ fn micros(start: std::time::Instant) -> f64 {
 fn sentence(found: &Occupancy) -> String {
     let what = match (found.collides, found.obstacle) {
         (false, _) => "Free".to_owned(),
-        (true, true) => format!("Obstacles among {}", count(found.pixels, "pixel")),
-        (true, false) => format!("No obstacle, {}", count(found.pixels, "pixel")),
+        (true, true) => format!("Obstacle within {}", count(found.pixels, "pixel")),
+        (true, false) => format!("No obstacle within {}", count(found.pixels, "pixel")),
     };
     match found.floor {
         Some(floor) => format!("{what}; the floor below is at {}.", short(floor)),

@@ -279,7 +279,7 @@ fn sentence(ended: Ended, route: &Route, tally: &Tally) -> String {
     match ended {
         Ended::Arrived => format!("Arrived at ({end}) after {far}."),
         Ended::Stuck { point } => {
-            format!("Stopped at ({end}) after {far}{}: something is in the way.", on_the_way(point))
+            format!("Stopped at ({end}) after {far}{}: an obstacle is in the way.", on_the_way(point))
         }
         Ended::LeftMap { point } => {
             format!("Fell below the map at ({end}) after {far}{}.", on_the_way(point))

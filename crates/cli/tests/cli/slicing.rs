@@ -207,7 +207,7 @@ fn boxes_and_objects_are_answered() {
     );
     let people = place.ok(&["slices", "query", "house", "--boxes", "boxes.jsonl"]).results;
     assert!(people.starts_with("Free; the floor below is at "), "{people}");
-    assert!(people.contains("Obstacles among "), "{people}");
+    assert!(people.contains("Obstacle within "), "{people}");
 
     let crate_corners: Vec<[f64; 3]> =
         (0..8_u8).map(|i| [0, 1, 2].map(|k| f64::from(i >> k & 1) * 0.5)).collect();
@@ -281,7 +281,7 @@ fn an_avatar_walks_up_the_stairs_and_leaves_a_trace() {
     assert!(people.starts_with("Arrived at (8, 9, 3"), "{people}");
     place.write("wall.json", "{\"start\":[7,6.5,0.1],\"points\":[[12,6.5]]}");
     let people = place.ok(&["slices", "walk", "house", "--route", "wall.json"]).results;
-    assert!(people.contains("on the way to point 1: something is in the way"), "{people}");
+    assert!(people.contains("on the way to point 1: an obstacle is in the way"), "{people}");
 }
 
 #[test]

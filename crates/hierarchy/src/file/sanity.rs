@@ -56,7 +56,7 @@ impl PointHierarchy {
             let bounds = tree.bounds(id);
             for i in self.topology.points(id) {
                 if bounds.reach < self.arrays.radii[i] {
-                    return wrong("the reach of node", id.index());
+                    return wrong("the greatest radius of node", id.index());
                 }
                 if !self.box_holds(id, i) {
                     return wrong("the box of node", id.index());
@@ -67,7 +67,7 @@ impl PointHierarchy {
         let mut sources: Vec<u32> = self.arrays.source.to_vec();
         sources.sort_unstable();
         match sources.windows(2).find(|two| two[0] == two[1]) {
-            Some(two) => wrong("the place in the input, stored twice,", two[0] as usize),
+            Some(two) => wrong("the repeated source index", two[0] as usize),
             None => Ok(()),
         }
     }

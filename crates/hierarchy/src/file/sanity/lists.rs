@@ -41,7 +41,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         }
         !(radius.is_finite() && held.iter().all(|&held| held != 0))
     });
-    Flaw::first("the ball about block", left_out)?;
+    Flaw::first("the bounding ball of block", left_out)?;
     let count = scan.arrays.groups.len();
     let wrong = scan.arrays.lists.iter().position(|list| {
         let entries =
