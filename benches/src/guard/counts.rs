@@ -217,7 +217,7 @@ fn hinted(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
     const STEPS: u32 = 10;
     let scan = &case.scans[0];
     let (plan, mut scratch) = (CollidePlan::new(options, scan, scan)?, Scratch::default());
-    let (still, step) = (scan.at(&Pose::IDENTITY), 0.1 * f64::from(scan.slices().sampling_radius));
+    let (still, step) = (scan.at(&Pose::IDENTITY), 0.1 * f64::from(scan.arrays().sampling_radius));
     let rng = &mut rng(1);
     let walks: Vec<(Pose, [f64; 3])> = case
         .questions

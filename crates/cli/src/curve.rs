@@ -264,7 +264,7 @@ fn sentence(found: &Curves) -> String {
 
 /// Returns the reason why curves may be missing.
 fn unfinished(views: [&Placed<'_>; 2]) -> &'static str {
-    let is_finite = |view: &&Placed<'_>| view.placed().to_row_major().iter().all(|c| c.is_finite());
+    let is_finite = |view: &&Placed<'_>| view.stored_to_world().to_row_major().iter().all(|c| c.is_finite());
     if views.iter().all(is_finite) {
         "The budget ran out, so curves may be missing. Raise --budget or --work."
     } else {

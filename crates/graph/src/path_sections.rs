@@ -64,7 +64,7 @@ impl ClosePairs {
     pub fn load(
         file: &File,
         part: u32,
-        (points, horizon): (usize, impl Fn(usize) -> f32),
+        (points, support_radius): (usize, impl Fn(usize) -> f32),
         check: Check,
     ) -> Result<Self, LoadError> {
         let onward = if file.has(ONWARD, part) { file.array(ONWARD, part)? } else { Array::default() };
@@ -78,7 +78,7 @@ impl ClosePairs {
         };
         map.check_structure(points)?;
         if check == Check::Full {
-            map.check_contents(points, horizon)?;
+            map.check_contents(points, support_radius)?;
         }
         Ok(map)
     }
@@ -98,7 +98,7 @@ impl ClosePairs {
         Flaw::first(LIST, descends.or((starts[0] != 0).then_some(0)))
     }
 
-    fn check_contents(&self, points: usize, horizon: impl Fn(usize) -> f32) -> Result<(), Flaw> {
+    fn check_contents(&self, points: usize, support_radius: impl Fn(usize) -> f32) -> Result<(), Flaw> {
         let (view, floors): (_, &[u8]) = (self.view(), &self.floors);
         let mut beside = self.beside.iter();
         for (i, own) in (0..self.len()).zip(0..) {
@@ -110,10 +110,10 @@ impl ClosePairs {
                     is_sound &= beside.next().is_some_and(|b| b.pair == pair) && !fits;
                 }
                 let point = close.point as usize;
-                let is_heard = point < points && close.distance <= rounded(horizon(point));
+                let is_within = point < points && close.distance <= rounded(support_radius(point));
                 let is_own = close.point == own && close.distance.to_bits() == 0;
                 let is_first = pair == pairs.start;
-                is_sound &= (is_heard || is_own) && is_own == is_first && before <= close.distance;
+                is_sound &= (is_within || is_own) && is_own == is_first && before <= close.distance;
                 before = close.distance;
             }
             Flaw::first(LIST, (!is_sound).then_some(i))?;

@@ -24,7 +24,7 @@ pub(crate) struct Subject {
     pub(crate) scan: Scan,
     pub(crate) twin: SurfaceTwin,
     /// Support radius of a point, per unit of the twin's radii.
-    pub(crate) horizon: f64,
+    pub(crate) support_radius: f64,
     /// Ids of the nodes by their points.
     ids: BTreeMap<(usize, usize), usize>,
     /// Bounds of the stored positions.
@@ -59,8 +59,8 @@ impl Subject {
                 bounds[1][k] = bounds[1][k].max(p[k]);
             }
         }
-        let (twin, horizon) = twin(&scan)?;
-        Ok(Self { scan, twin, horizon, ids, bounds })
+        let (twin, support_radius) = twin(&scan)?;
+        Ok(Self { scan, twin, support_radius, ids, bounds })
     }
 
     /// Returns the radius of the obstacle's ball about point `i`; zero if the point samples a
@@ -77,9 +77,9 @@ impl Subject {
     /// nearest point it is. It is the radius of its ball, or of its cell, or of its disc with a
     /// thickness of a twentieth of the radius.
     pub(crate) fn reach(&self, i: usize) -> f64 {
-        let slices = self.scan.slices();
+        let arrays = self.scan.arrays();
         if self.is_on_sheet(i) {
-            self.cell(i).max(1.05 * f64::from(slices.discs.get(i)))
+            self.cell(i).max(1.05 * f64::from(arrays.discs.get(i)))
         } else {
             self.ball(i)
         }
@@ -107,9 +107,9 @@ impl Subject {
     /// Returns `true` if `x` in the stored frame is in the cell of point `i`, up to rounding,
     /// assuming that `i` is its nearest point.
     pub(crate) fn is_in_cell_of(&self, i: usize, x: [f64; 3]) -> bool {
-        let slices = self.scan.slices();
-        let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.position(i)[k]));
-        let height: f64 = (0..3).map(|k| d[k] * f64::from(slices.normals[i][k])).sum();
+        let arrays = self.scan.arrays();
+        let d = [0, 1, 2].map(|k| x[k] - f64::from(arrays.position(i)[k]));
+        let height: f64 = (0..3).map(|k| d[k] * f64::from(arrays.normals[i][k])).sum();
         let distance = d.iter().map(|x| x * x).sum::<f64>().sqrt();
         self.is_on_sheet(i)
             && height.abs() <= rounded(SLAB * self.radius(i))
@@ -117,7 +117,7 @@ impl Subject {
     }
 
     fn is_on_sheet(&self, i: usize) -> bool {
-        i < self.scan.slices().dense && matches!(self.scan.kind(i), PointKind::Sheet | PointKind::Edge)
+        i < self.scan.arrays().dense && matches!(self.scan.kind(i), PointKind::Sheet | PointKind::Edge)
     }
 
     fn radius(&self, i: usize) -> f64 {
@@ -125,7 +125,7 @@ impl Subject {
     }
 
     fn cell(&self, i: usize) -> f64 {
-        self.radius(i).min(0.5 * f64::from(self.scan.slices().reach))
+        self.radius(i).min(0.5 * f64::from(self.scan.arrays().reach))
     }
 
     /// # Errors
@@ -135,11 +135,11 @@ impl Subject {
         let Some(&id) = self.ids.get(&(first as usize, count as usize)) else {
             return Err(format!("expected the points of a node, got {count} from {first}"));
         };
-        let slices = self.scan.slices();
+        let arrays = self.scan.arrays();
         let stored = if semantics == Semantics::Obstacle {
-            slices.obstacle_enclosure(id)
+            arrays.obstacle_enclosure(id)
         } else {
-            slices.enclosure(id)
+            arrays.enclosure(id)
         };
         let bits = |[a, b, c]: [f32; 3]| [a.to_bits(), b.to_bits(), c.to_bits()];
         let same = bits(stored.centre) == bits(claimed.centre)
@@ -218,8 +218,8 @@ fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
     };
     let unit = scan.frame().scale;
     let (reach, radii) = match options.bandwidth {
-        Bandwidth::Local => (options.horizon, scan.radii().iter().map(|r| f64::from(*r)).collect()),
-        Bandwidth::Global => (options.horizon, vec![scan.sampling_radius() / unit; scan.len()]),
+        Bandwidth::Local => (options.support_radius, scan.radii().iter().map(|r| f64::from(*r)).collect()),
+        Bandwidth::Global => (options.support_radius, vec![scan.sampling_radius() / unit; scan.len()]),
         // The support radius for which the bandwidth is the given one.
         Bandwidth::Fixed(h) => (1.0 / kernel.bandwidth(1.0), vec![h / unit; scan.len()]),
         other => return Err(format!("expected the bandwidth Local, Global or Fixed, got {other:?}")),

@@ -88,9 +88,9 @@ impl<'a> Tree<'a> {
         let scan = &subject.scan;
         let inverse = |b: OrientedBox| Inverse::new(b.centre, b.half, b.axes);
         let boxes = scan.enclosures().map(inverse).collect();
-        let slices = scan.slices();
+        let arrays = scan.arrays();
         let topology = scan.topology();
-        let of_obstacle = topology.ids().map(|id| inverse(slices.obstacle_enclosure(id.index()))).collect();
+        let of_obstacle = topology.ids().map(|id| inverse(arrays.obstacle_enclosure(id.index()))).collect();
         let mut parents = vec![0; topology.len()];
         let mut leaves = vec![0; scan.len()];
         for id in topology.ids() {

@@ -131,7 +131,7 @@ fn is_nearly_ok(subject: &Subject, x: [f64; 3], at: &Evaluation) -> bool {
     let options = subject.scan.plan().options();
     let (mut support, mut is_near) = (0, false);
     for (p, r) in subject.twin.points().iter().zip(subject.twin.radii()) {
-        let (d, reach) = (distance(p, &x), subject.horizon * r * (1.0 + DISTANCE));
+        let (d, reach) = (distance(p, &x), subject.support_radius * r * (1.0 + DISTANCE));
         support += u32::from(d < reach);
         is_near |= d <= 0.5 * reach;
     }

@@ -77,7 +77,7 @@ impl PointHierarchy {
         let bounds = self.tree().bounds(id);
         let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let d = double(self.positions()[i]) - double(bounds.centre);
-        let ball = f64::from(self.slices().ball(i).max(self.slices().obstacle_ball(i)));
+        let ball = f64::from(self.arrays().ball(i).max(self.arrays().obstacle_ball(i)));
         (0..3).all(|k| {
             let axis = double(bounds.axes[k]);
             let spread = f64::from(self.discs().get(i)) * double(self.arrays.normals[i]).cross(&axis).norm();

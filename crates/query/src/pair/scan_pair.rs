@@ -3,20 +3,20 @@
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, Slices, TreePair};
+use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, ScanArrays, TreePair};
 
 use crate::ask::options::{CollidePlan, Semantics};
 use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
-use crate::pair::motion::Motion;
 use crate::pair::placed::Placed;
+use crate::pair::relative_pose::RelativePose;
 
 /// Two placed scans, their arrays, the relative pose, and the cost of the search.
 #[derive(Debug)]
 pub(crate) struct ScanPair<'a> {
     pub(crate) views: [&'a Placed<'a>; 2],
-    pub(crate) a: &'a Slices<'a>,
-    pub(crate) b: &'a Slices<'a>,
+    pub(crate) a: &'a ScanArrays<'a>,
+    pub(crate) b: &'a ScanArrays<'a>,
     pub(crate) relative: Relative,
     pub(crate) meter: Meter,
     /// The part of each scan that the enclosures contain.
@@ -28,18 +28,18 @@ pub(crate) struct ScanPair<'a> {
 impl<'a> ScanPair<'a> {
     pub(crate) fn new(
         views: [&'a Placed<'a>; 2],
-        slices: [&'a Slices<'a>; 2],
+        arrays: [&'a ScanArrays<'a>; 2],
         relative: Relative,
         meter: Meter,
         (level, part): (Level, Part),
     ) -> Self {
-        let [a, b] = slices;
+        let [a, b] = arrays;
         Self { views, a, b, relative, meter, part, level }
     }
 
     /// Returns `true` if both nodes exist and are leaves.
     pub(crate) fn are_leaves(&self, pair: NodePair) -> bool {
-        let is_leaf = |scan: &Slices<'_>, id: NodeId| {
+        let is_leaf = |scan: &ScanArrays<'_>, id: NodeId| {
             let topology = scan.tree.topology();
             topology.has(id) && topology.is_leaf(id)
         };
@@ -78,11 +78,11 @@ impl<'a> ScanPair<'a> {
     }
 
     /// The trees of both scans, for a descent by distance.
-    pub(crate) fn bounds<'t>(&self, motion: &'t Motion) -> Bounds<'t>
+    pub(crate) fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
     where
         'a: 't,
     {
-        Bounds { trees: [&self.a.tree, &self.b.tree], motion, part: self.part }
+        Bounds { trees: [&self.a.tree, &self.b.tree], relative_pose, part: self.part }
     }
 
     /// The band at two points, in the world: the greater of their local radii.
@@ -98,7 +98,7 @@ impl<'a> ScanPair<'a> {
 
     /// The greater of two lengths given in the frames of the scans, in the world.
     fn in_world(&self, [of_a, of_b]: [f32; 2]) -> f64 {
-        let [a, b] = self.views.map(|view| view.placed().scale());
+        let [a, b] = self.views.map(|view| view.stored_to_world().scale());
         (f64::from(of_a) * a).max(f64::from(of_b) * b)
     }
 
@@ -106,7 +106,7 @@ impl<'a> ScanPair<'a> {
     /// gap there.
     pub(crate) fn stored(&self, length: f64) -> f32 {
         #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
-        let length = (length / self.views[0].placed().scale()) as f32 * (1.0 + 1e-6);
+        let length = (length / self.views[0].stored_to_world().scale()) as f32 * (1.0 + 1e-6);
         length + self.relative.slack()
     }
 
@@ -139,7 +139,7 @@ pub(crate) fn relative(
     b: &Placed<'_>,
     plan: &CollidePlan,
 ) -> Result<(Pose, Relative), Option<f64>> {
-    let ratio = b.placed().scale() / a.placed().scale();
+    let ratio = b.stored_to_world().scale() / a.stored_to_world().scale();
     if !(a.is_proper() && b.is_proper() && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
         return Err(None);
     }
@@ -158,12 +158,12 @@ pub(crate) fn relative(
     if gap > plan.reach() && (!plan.options().certifies() || gap > FAR_APART * (ra + rb)) {
         return Err(Some(gap));
     }
-    let pose = a.placed().inverse().after(b.placed());
+    let pose = a.stored_to_world().inverse().after(b.stored_to_world());
     // Coordinates in a's stored frame, of a's own points and of b's.
-    let extent = size(own.centre.into()) + (distance + ra + 2.0 * rb) / a.placed().scale();
+    let extent = size(own.centre.into()) + (distance + ra + 2.0 * rb) / a.stored_to_world().scale();
     let shift = size(pose.translation().into());
     // The slack of `Relative` is proportional to the extent passed to it.
-    let lost = lost / a.placed().scale() / f64::from(SLACK);
+    let lost = lost / a.stored_to_world().scale() / f64::from(SLACK);
     let relative = Relative::new(&pose, extent + shift + lost);
     Ok((pose, relative))
 }
@@ -189,10 +189,13 @@ impl Balls {
     /// Places the `stored` balls, given in the frames of the scans, in the world.
     fn of([a, b]: [&Placed<'_>; 2], stored: [Ball; 2]) -> Self {
         let placed = |view: &Placed<'_>, ball: &Ball| {
-            (Vector3::from(view.placed().apply(ball.centre)), ball.radius * view.placed().scale())
+            (
+                Vector3::from(view.stored_to_world().apply(ball.centre)),
+                ball.radius * view.stored_to_world().scale(),
+            )
         };
         let ((ca, ra), (cb, rb)) = (placed(a, &stored[0]), placed(b, &stored[1]));
-        let far = |view: &Placed<'_>| size(view.placed().translation().into());
+        let far = |view: &Placed<'_>| size(view.stored_to_world().translation().into());
         let lost = DOUBLE_ROUNDING * (far(a) + far(b) + size(ca) + size(cb));
         let distance = (ca - cb).norm();
         let gap = distance * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6) - lost;

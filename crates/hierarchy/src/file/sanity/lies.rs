@@ -154,7 +154,7 @@ fn points_that_no_build_writes() {
             deep(&named("the radius"), |scan| scan.arrays.radii.to_mut()[i] = value);
         }
         deep(&format!("the bounding box of point {i}"), |scan| {
-            let x = scan.slices().position(i)[0];
+            let x = scan.arrays().position(i)[0];
             lie_of_position(scan, i, 0, x + 1.0);
         });
         deep(&named("the normal"), |scan| scan.arrays.normals.to_mut()[i] = [0.0; 3]);
@@ -171,12 +171,12 @@ fn blocks_that_are_not_the_points() {
     for (block, lane) in [(0, 3), (7, 15), (18, 12), (18, 13)] {
         let copy = format!("the copy of the points of block {block}");
         deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].position[1][lane] = 7.0);
-        deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].horizon[lane] += 0.5);
+        deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].support_radius[lane] += 0.5);
     }
     for value in NONE.into_iter().chain([0.0, -1.0]) {
-        deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].horizon[5] = value);
+        deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].support_radius[5] = value);
     }
-    deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].horizon[5] *= 0.99);
+    deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].support_radius[5] *= 0.99);
     deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] += 0.5);
     deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] = f32::NAN);
 }
