@@ -69,7 +69,7 @@ pub struct CurveArgs {
 
 fn parse_length(text: &str) -> Result<f64, String> {
     let length = text.parse().ok().filter(|l: &f64| *l > 0.0 && l.is_finite());
-    length.ok_or_else(|| "expected a length above 0, in world units".into())
+    length.ok_or_else(|| "expected a length of more than zero, in world units".into())
 }
 
 /// The JSON output of `curve`.

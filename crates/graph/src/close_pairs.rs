@@ -103,7 +103,7 @@ impl ClosePairs {
                 starts[found.point as usize + 1] += 1;
             }
         }
-        assert!(u32::try_from(total).is_ok(), "{total} pairs are more than a list can number");
+        assert!(u32::try_from(total).is_ok(), "expected fewer than 2^32 close pairs, got {total}");
         for i in 0..count {
             starts[i + 1] += starts[i];
         }

@@ -98,7 +98,11 @@ impl<'a> GeodesicKernel<'a> {
         graph: &'a Adjacency,
         pairs: &'a ClosePairs,
     ) -> Self {
-        assert_eq!([positions.len(), radii.len(), graph.len()], [pairs.len(); 3], "one of each a point");
+        assert_eq!(
+            [positions.len(), radii.len(), graph.len()],
+            [pairs.len(); 3],
+            "expected a position, a radius and two lists for each point"
+        );
         let (starts, neighbours) = graph.slices();
         Self { plan, positions, radii, starts, neighbours, lists: pairs.view() }
     }

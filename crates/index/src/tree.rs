@@ -180,8 +180,8 @@ impl BlockBoxes {
         points: usize,
         room: impl Fn(usize) -> Result<Room<Boxes>, E>,
     ) -> Result<Self, E> {
-        assert_eq!(blocks.len(), points.div_ceil(WIDTH), "{points} points fill other blocks");
-        assert!(points < u32::MAX as usize, "{points} points have no ids");
+        assert_eq!(blocks.len(), points.div_ceil(WIDTH), "expected the blocks of {points} points");
+        assert!(points < u32::MAX as usize, "expected fewer than 2^32 - 1 points, got {points}");
         let mut level = room(blocks.len().div_ceil(WIDTH))?;
         fill(&mut level, |group| {
             let of = |block: usize| Bounds::of_block(&blocks[block], (points - block * WIDTH).min(WIDTH));
@@ -204,7 +204,12 @@ impl BlockBoxes {
     #[inline]
     #[must_use]
     pub fn over<'a>(&'a self, blocks: &'a [PointBlock]) -> BlockTree<'a> {
-        assert_eq!(blocks.len(), self.points.div_ceil(WIDTH), "{} points fill other blocks", self.points);
+        assert_eq!(
+            blocks.len(),
+            self.points.div_ceil(WIDTH),
+            "expected the blocks of {} points",
+            self.points
+        );
         BlockTree { blocks, points: self.points, levels: &self.levels }
     }
 

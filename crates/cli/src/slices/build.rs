@@ -122,7 +122,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     pool.install(|| {
         let mut builder = SliceBuilder::new_in(&plan, &work).map_err(unsuitable)?;
         if builder.is_filled() {
-            console.note("going on with the work of an ended run");
+            console.note("resuming an interrupted run");
         } else {
             match &source {
                 Pieces::Points(points) => {

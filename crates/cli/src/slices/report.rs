@@ -104,7 +104,7 @@ impl Report {
             short(self.slice_height)
         ))?;
         results.line(format_args!(
-            "obstacles  points that span more than {} of height in a pixel ({:.1} % of a slice){}",
+            "obstacles  pixels whose points span more than {} upwards ({:.1} % of a slice){}",
             short(about.share * grid.slice_height),
             100.0 * about.share,
             of_noise(about)

@@ -202,7 +202,7 @@ impl PointHierarchy {
     /// # Panics
     /// If `oriented` does not have one normal for each point.
     pub fn turn_normals(&mut self, oriented: &[[f32; 3]]) {
-        assert_eq!(oriented.len(), self.len(), "a normal a point");
+        assert_eq!(oriented.len(), self.len(), "expected a normal for each point");
         for (normal, to) in self.arrays.normals.to_mut().iter_mut().zip(oriented) {
             if dot(*normal, *to) < 0.0 {
                 *normal = normal.map(|c| -c);
