@@ -5,7 +5,7 @@
 use nearmiss::PointHierarchy;
 use nearmiss::geometry::NodeId;
 use nearmiss::geometry::nalgebra::Vector3;
-use nearmiss::hierarchy::{OrientedBox, Part, Slices};
+use nearmiss::hierarchy::{OrientedBox, Part, ScanArrays};
 
 use crate::sample::count;
 
@@ -51,8 +51,8 @@ fn distance_sq(centres: &[Vector3<f64>], x: Vector3<f64>) -> f64 {
     centres.iter().map(|c| (c - x).norm_squared()).fold(f64::INFINITY, f64::min)
 }
 
-fn centres(slices: &Slices<'_>, node: usize) -> Vec<Vector3<f64>> {
-    slices.samples(node).iter().map(|i| wide(slices.position(i))).collect()
+fn centres(arrays: &ScanArrays<'_>, node: usize) -> Vec<Vector3<f64>> {
+    arrays.samples(node).iter().map(|i| wide(arrays.position(i))).collect()
 }
 
 impl Hulls {
@@ -73,8 +73,8 @@ impl Hulls {
         Self { directions, of_leaves }
     }
 
-    fn under(&self, slices: &Slices<'_>, node: usize) -> &[Hull] {
-        &self.of_leaves[slices.tree.topology().leaves_under(node_id(node))]
+    fn under(&self, arrays: &ScanArrays<'_>, node: usize) -> &[Hull] {
+        &self.of_leaves[arrays.tree.topology().leaves_under(node_id(node))]
     }
 
     fn contain(&self, hulls: &[Hull], x: Vector3<f64>) -> bool {
@@ -86,17 +86,17 @@ impl Hulls {
     /// numbers from 0 to 1.
     pub fn volumes(
         &self,
-        slices: &Slices<'_>,
+        arrays: &ScanArrays<'_>,
         node: usize,
         draws: usize,
         share: &mut impl FnMut() -> f64,
     ) -> Volumes {
-        let (centres, hulls) = (centres(slices, node), self.under(slices, node));
-        let radius = f64::from(slices.covering_radius(node));
-        let topology = slices.tree.topology();
+        let (centres, hulls) = (centres(arrays, node), self.under(arrays, node));
+        let radius = f64::from(arrays.covering_radius(node));
+        let topology = arrays.tree.topology();
         let leaves = topology.leaves_under(node_id(node));
         let enclosures: Vec<OrientedBox> =
-            leaves.map(|leaf| slices.tree.enclosure(Part::Surface, topology.leaf(leaf))).collect();
+            leaves.map(|leaf| arrays.tree.enclosure(Part::Surface, topology.leaf(leaf))).collect();
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for c in &centres {
             low = low.inf(&c.add_scalar(-radius));
@@ -123,8 +123,8 @@ impl Hulls {
     /// The radius of a node's balls as the paper finds it. Test points in H, weighted means of the
     /// points of random leaves with their borders, make it grow. After a miss the next points are
     /// drawn near it. `share` draws numbers from 0 to 1.
-    pub fn grown_radius(&self, slices: &Slices<'_>, node: usize, share: &mut impl FnMut() -> f64) -> f64 {
-        let (centres, hulls) = (centres(slices, node), self.under(slices, node));
+    pub fn grown_radius(&self, arrays: &ScanArrays<'_>, node: usize, share: &mut impl FnMut() -> f64) -> f64 {
+        let (centres, hulls) = (centres(arrays, node), self.under(arrays, node));
         let (mut radius_sq, mut inside, mut near) = (0.0_f64, 0, 0);
         let mut hull = &hulls[0];
         while inside < INSIDE_IN_A_ROW {
@@ -161,7 +161,7 @@ fn hull(scan: &PointHierarchy, bounds: &OrientedBox, directions: &[Vector3<f64>;
     let (tree, mut open) = (scan.tree(), vec![NodeId::ROOT]);
     while let Some(id) = open.pop() {
         let about = tree.bounds(id);
-        let border = scan.plan().horizon(about.reach);
+        let border = scan.plan().support_radius(about.reach);
         if bounds.distance_sq(about.centre).sqrt() > border + about.radius() {
             continue;
         }
@@ -170,7 +170,7 @@ fn hull(scan: &PointHierarchy, bounds: &OrientedBox, directions: &[Vector3<f64>;
             continue;
         }
         let within = |&i: &usize| {
-            let border = scan.plan().horizon(scan.radii()[i]);
+            let border = scan.plan().support_radius(scan.radii()[i]);
             bounds.distance_sq(scan.positions()[i]) <= border * border
         };
         points.extend(tree.topology().points(id).filter(within).map(|i| scan.positions()[i]));

@@ -112,7 +112,7 @@ fn range(panel: &Panel, k: usize) -> Result<std::ops::Range<f64>, Failure> {
     let shown = values.filter(|v| v.is_finite() && (!is_logarithmic || *v > 0.0));
     let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     if low > high {
-        return Err(format!("{}: nothing to show", panel.title).into());
+        return Err(format!("{}: expected points to plot, got none", panel.title).into());
     }
     let room = if k == 1 { HEADROOM } else { 0.05 };
     Ok(if is_logarithmic {

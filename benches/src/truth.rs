@@ -37,14 +37,16 @@ pub fn read(path: &Path, bounds: &Aabb) -> Result<Vec<Question>, Failure> {
 fn parse(line: &str, bounds: &Aabb) -> Result<Question, Failure> {
     let value: serde_json::Value = serde_json::from_str(line)?;
     let pose = |key: &str| -> Result<Pose, Failure> {
-        let entries = value[key].as_array().ok_or_else(|| format!("no pose {key:?}"))?;
+        let entries = value[key].as_array().ok_or_else(|| format!("expected a pose {key:?}, got none"))?;
         let entries: Option<Vec<f64>> = entries.iter().map(serde_json::Value::as_f64).collect();
         let entries: Option<[f64; 16]> = entries.and_then(|e| e.try_into().ok());
-        let entries = entries.ok_or_else(|| format!("pose {key:?} is not 16 numbers"))?;
+        let entries = entries.ok_or_else(|| format!("expected 16 numbers as pose {key:?}"))?;
         let size = bounds.half_extents().into_iter().fold(0.0, f64::max);
         Ok(Pose::from_row_major(&entries, bounds, TOLERANCE * size)?)
     };
-    let truth = value["truth"].as_bool().ok_or("no answer \"truth\"")?;
-    let gap = value["gap"].as_f64().ok_or("no \"gap\": such a set is for information, not for scoring")?;
+    let truth = value["truth"].as_bool().ok_or("expected an answer \"truth\", got none")?;
+    let gap = value["gap"]
+        .as_f64()
+        .ok_or("expected a number \"gap\", got none; sets without gaps cannot be scored")?;
     Ok(Question { a: pose("a")?, b: pose("b")?, truth, gap })
 }

@@ -25,7 +25,7 @@ const CHECKS: [(&str, Check); 9] = [
 pub(crate) fn run_named(names: &[&str]) -> Outcome<Vec<(&'static str, Duration)>> {
     if let Some(unknown) = names.iter().find(|name| CHECKS.iter().all(|(known, _)| known != *name)) {
         let known: Vec<&str> = CHECKS.iter().map(|(name, _)| *name).collect();
-        return Err(format!("no check `{unknown}`; there are {}", known.join(", ")).into());
+        return Err(format!("expected one of {}, got `{unknown}`", known.join(", ")).into());
     }
     let mut times = Vec::new();
     for (name, check) in CHECKS {
@@ -105,11 +105,11 @@ fn features() -> Outcome {
 /// program) write the same file.
 fn determinism() -> Outcome {
     if cfg!(debug_assertions) {
-        return Err("run it by `cargo xtask`, which is a release build".into());
+        return Err("expected a release build, got a debug build; run it with `cargo xtask`".into());
     }
     run_cargo(&["test", "--workspace", "--no-run", "--quiet"])?;
     let release = std::env::current_exe()?;
-    let target = release.ancestors().nth(2).ok_or("this program is in no target folder")?;
+    let target = release.ancestors().nth(2).ok_or("expected this program in a target folder")?;
     let debug = target.join("debug").join(format!("nearmiss{}", std::env::consts::EXE_SUFFIX));
     let folder = target.join("determinism");
     std::fs::create_dir_all(&folder)?;
@@ -127,7 +127,9 @@ fn determinism() -> Outcome {
     }
     let (first, bytes) = &files[0];
     match files.iter().find(|(_, other)| other != bytes) {
-        Some((other, _)) => Err(format!("{first} and {other} give different files").into()),
+        Some((other, _)) => {
+            Err(format!("expected identical files, got different ones from {first} and from {other}").into())
+        }
         None => Ok(()),
     }
 }

@@ -66,7 +66,7 @@ fn circles_of(arrows: &[(Module, Module)]) -> Vec<String> {
     let told = circles.map(|circle| {
         let mut names: Vec<String> = circle.iter().map(|node| graph[*node].join("::")).collect();
         names.sort();
-        format!("{} use each other in a circle; move what they share below them", names.join(", "))
+        format!("{} depend on each other in a cycle; move what they share below them", names.join(", "))
     });
     told.collect()
 }
@@ -226,7 +226,7 @@ mod tests {
     fn circles_are_found_however_things_are_named() {
         let root = ("", "mod a; mod b; pub use b::B;");
         let back = ("b", "use crate::a::{self, A}; pub struct B;");
-        let circle = ["a, b use each other in a circle; move what they share below them"];
+        let circle = ["a, b depend on each other in a cycle; move what they share below them"];
         assert_eq!(told(&[root, ("a", "use crate::b::B; pub struct A;"), back]), circle);
         assert_eq!(told(&[root, ("a", "use crate::B; pub struct A;"), back]), circle, "by the root's name");
         assert_eq!(told(&[root, ("a", "pub struct A(super::b::B);"), back]), circle, "by a path");
@@ -252,7 +252,7 @@ mod tests {
         let files =
             [root, ("a", "mod x; mod w;"), ("a::w", "pub struct W;"), upper, ("b", "mod y; mod z;"), lower];
         assert!(told(&files).is_empty());
-        let circle = ["folders a, b use each other in a circle; move what they share below them"];
+        let circle = ["folders a, b depend on each other in a cycle; move what they share below them"];
         assert_eq!(told(&[&files[..], &[back]].concat()), circle);
     }
 

@@ -29,14 +29,14 @@ pub(crate) fn run() -> Outcome {
     let r = scan.sampling_radius();
     let touch = first_touch(&scan)?;
     println!(
-        "\nA second copy comes in. At offset 0 the nearest two points are one sampling radius r = {r:.5} apart;"
+        "\nA second copy approaches. At offset 0 the nearest two points are one sampling radius, r = {r:.5}, apart."
     );
     println!(
-        "offsets, in r, go further in. Rows marked ~ lie within r of contact, where nothing is promised."
+        "Offsets are in r and increase with depth. Rows marked ~ are within r of contact, where answers may be wrong."
     );
     println!(
-        "Nearest: the least distance of any two points, in r, found by asking about ever larger balls. Gap: what the\n\
-         certificate proves of the surfaces, in r.\n"
+        "Nearest: the least distance between two points, in r. Gap: the certified lower bound of the distance of the\n\
+         surfaces, in r.\n"
     );
     println!(
         "{:>8}  {:<10} {:<10} {:>8} {:>8} {:>9} {:>9} {:>12} {:>11}",
@@ -58,8 +58,8 @@ pub(crate) fn run() -> Outcome {
         print_row(offset, &answer, [distance, r], micros);
     }
     let picture = draw(&scan, &a, &plan, touch - PICTURED * r, folder.join("contact.png"))?;
-    println!("\nA picture of the contact at offset {PICTURED}: {}", picture.display());
-    println!("Both scans, the witness and both normals; the same as `nearmiss collide … --image`.");
+    println!("\nPicture of the contact at offset {PICTURED}: {}", picture.display());
+    println!("It shows both scans, the witness and both normals, as `nearmiss collide … --image` does.");
     Ok(())
 }
 
@@ -80,11 +80,11 @@ fn prepared(path: &std::path::Path) -> Outcome<Scan> {
     println!("  read      {:8.2} ms", millis(read));
     println!("  prepared  {:8.2} ms", millis(built - read));
     println!(
-        "  saved     {:8.2} ms, {:.0} bytes a point",
+        "  saved     {:8.2} ms, {:.0} bytes per point",
         millis(saved - built),
         bytes as f64 / scan.len() as f64
     );
-    println!("  opened    {:8.2} ms, mapped, every checksum compared", millis(opened - saved));
+    println!("  opened    {:8.2} ms, mapped, all checksums verified", millis(opened - saved));
     println!("  usable    {:8.1} % of the points", 100.0 * scan.usable());
     Ok(scan)
 }

@@ -67,10 +67,10 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> Outcome {
         return table(&args);
     }
     let ([scan], Some(output)) = (args.scans.as_slice(), &args.output) else {
-        return Err("a picture is of one scan".into());
+        return Err("expected one scan and -o OUT.png for a picture; give --table for several scans".into());
     };
     if !(args.width > 0.0 && args.width.is_finite() && args.noise >= 0.0 && args.noise.is_finite()) {
-        return Err("the width must be positive, the noise no less than zero".into());
+        return Err("expected a finite --width above 0 and a finite --noise of at least 0".into());
     }
     paint(&args, scan, output)
 }
@@ -79,7 +79,7 @@ fn vector(text: &str) -> Result<Vector3<f64>, String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|t| t.trim().parse::<f64>()).collect();
     match numbers.as_deref() {
         Ok(&[x, y, z]) if [x, y, z].iter().all(|c| c.is_finite()) => Ok(Vector3::new(x, y, z)),
-        _ => Err("three numbers with commas between".into()),
+        _ => Err("expected three numbers separated by commas".into()),
     }
 }
 
@@ -101,7 +101,7 @@ fn paint(args: &Args, path: &Path, output: &Path) -> Outcome {
     let slice = match (args.at, args.normal) {
         (Some(at), Some(normal)) => {
             let middle = Vector3::from(clean.frame().to_local(at.into()).map(f64::from));
-            let normal = normal.try_normalize(0.0).ok_or("the normal must not be zero")?;
+            let normal = normal.try_normalize(0.0).ok_or("expected a normal that is not zero")?;
             Slice::facing(middle, normal, half)
         }
         _ => Slice::telling(&clean, half),

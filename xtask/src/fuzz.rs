@@ -72,7 +72,7 @@ fn host() -> Outcome<String> {
     let output = Command::new("rustc").arg("-vV").current_dir(root()).output()?;
     let text = String::from_utf8(output.stdout)?;
     let host = text.lines().find_map(|line| line.strip_prefix("host: "));
-    Ok(host.ok_or("rustc names no host")?.to_owned())
+    Ok(host.ok_or("expected a line `host:` from `rustc -vV`, got none")?.to_owned())
 }
 
 /// Returns small valid inputs of every kind.

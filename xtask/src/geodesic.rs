@@ -11,11 +11,11 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     let (mut scan, mut from, mut output) = (None, 0, None);
     let mut words = words.iter();
     while let Some(&word) = words.next() {
-        let mut value = || words.next().ok_or(format!("{word} needs a value"));
+        let mut value = || words.next().ok_or(format!("expected a value after {word}, got none"));
         match word {
-            "--from" => from = value()?.parse().or(Err("a point is a number"))?,
+            "--from" => from = value()?.parse().or(Err("expected the index of a point after --from"))?,
             "-o" => output = Some(PathBuf::from(value()?)),
-            _ if word.starts_with('-') => return Err(format!("unknown option {word}").into()),
+            _ if word.starts_with('-') => return Err(format!("expected --from or -o, got {word}").into()),
             _ => scan = Some(PathBuf::from(word)),
         }
     }
@@ -24,7 +24,12 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     let scan = prepared(&path)?;
     let points = scan.len();
     let picture = nearmiss_cli::geodesic_picture(&scan, from);
-    let none = || format!("{}: it has no graph, or no point {from} of {points}", path.display());
+    let none = || {
+        format!(
+            "{}: expected a scan with a graph and a point below {points}, got point {from} or no graph",
+            path.display()
+        )
+    };
     picture.ok_or_else(none)?.save(&output)?;
     println!("{}", output.display());
     Ok(())

@@ -66,7 +66,7 @@ fn unpacked(commit: &str) -> Outcome<PathBuf> {
         .args(["archive", "--format=tar", commit, "crates"])
         .stdout(Stdio::piped())
         .spawn()?;
-    let tar = archive.stdout.take().ok_or("git archive has no output")?;
+    let tar = archive.stdout.take().ok_or("expected an output of `git archive`, got none")?;
     run(Command::new("tar").arg("-x").arg("-C").arg(&folder).stdin(tar), "tar")?;
     if !archive.wait()?.success() {
         return Err(format!("expected a commit with the folder `crates`, got `{commit}`").into());

@@ -14,11 +14,11 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     let (mut scan, mut depths, mut output) = (None, Vec::new(), None);
     let mut words = words.iter();
     while let Some(&word) = words.next() {
-        let mut value = || words.next().ok_or(format!("{word} needs a value"));
+        let mut value = || words.next().ok_or(format!("expected a value after {word}, got none"));
         match word {
-            "--depth" => depths.push(value()?.parse().or(Err("a depth is a number"))?),
+            "--depth" => depths.push(value()?.parse().or(Err("expected a whole number after --depth"))?),
             "-o" => output = Some(PathBuf::from(value()?)),
-            _ if word.starts_with('-') => return Err(format!("unknown option {word}").into()),
+            _ if word.starts_with('-') => return Err(format!("expected --depth or -o, got {word}").into()),
             _ => scan = Some(PathBuf::from(word)),
         }
     }

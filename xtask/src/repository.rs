@@ -55,7 +55,8 @@ pub(crate) struct Member {
 pub(crate) fn members() -> Outcome<Vec<Member>> {
     let text = ask_cargo(&["metadata", "--no-deps", "--format-version", "1"])?;
     let metadata: serde_json::Value = serde_json::from_str(&text)?;
-    let packages = metadata["packages"].as_array().ok_or("cargo metadata lists no packages")?;
+    let packages =
+        metadata["packages"].as_array().ok_or("expected packages from `cargo metadata`, got none")?;
     let mut members: Vec<Member> = packages.iter().filter_map(member).collect();
     members.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(members)

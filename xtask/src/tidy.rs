@@ -92,7 +92,11 @@ pub(crate) fn run() -> Outcome {
     for fault in &faults {
         println!("{fault}");
     }
-    if faults.is_empty() { Ok(()) } else { Err(format!("{} places to tidy", faults.len()).into()) }
+    if faults.is_empty() {
+        Ok(())
+    } else {
+        Err(format!("expected tidy sources, got {} faults", faults.len()).into())
+    }
 }
 
 fn find_faults() -> Outcome<Vec<String>> {
@@ -113,12 +117,16 @@ fn find_faults() -> Outcome<Vec<String>> {
     faults.extend(types.doubled());
     for member in members()? {
         let Some((_, allowed)) = LAYERS.iter().find(|(name, _)| *name == member.name) else {
-            faults.push(format!("{}: add it to the table of layers", member.name));
+            faults.push(format!(
+                "{}: expected an entry in the table of layers, got none; add it to `LAYERS`",
+                member.name
+            ));
             continue;
         };
         for used in member.dependencies.iter().filter(|used| used.starts_with("nearmiss")) {
             if !allowed.contains(&used.as_str()) {
-                faults.push(format!("{} may not use {used}: it is no layer below", member.name));
+                faults
+                    .push(format!("{}: expected dependencies on lower layers only, got {used}", member.name));
             }
         }
         let circles = circles(&member.folder.join("src"))?;
@@ -146,28 +154,33 @@ fn source_faults(path: &Path, text: &str, references: &str) -> Vec<String> {
     let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or(text);
     let lines = code.lines().count();
     if lines > MOST_LINES {
-        faults.push(format!("{shown}: {lines} lines; more than {MOST_LINES} is more than one thing"));
+        faults.push(format!("{shown}: expected at most {MOST_LINES} lines, got {lines}; split the file"));
     }
     if path.file_name().is_some_and(|name| VAGUE.iter().any(|vague| name == *vague)) {
-        faults.push(format!("{shown}: name it after what is inside"));
+        faults.push(format!("{shown}: expected a name that says what the file contains; rename it"));
     }
     for (number, line) in text.lines().enumerate() {
         if line.trim_start().starts_with("//") && line.chars().count() > COMMENT_WIDTH {
-            faults.push(format!("{shown}:{}: a comment reaches beyond column {COMMENT_WIDTH}", number + 1));
+            faults.push(format!(
+                "{shown}:{}: expected comments of at most {COMMENT_WIDTH} columns, got a longer one; wrap it",
+                number + 1
+            ));
         }
     }
     for (line, word) in banned_openings(text) {
         faults.push(format!(
-            "{shown}:{line}: documentation starts with `{word}`; start with a noun phrase or a verb"
+            "{shown}:{line}: expected documentation that starts with a noun phrase or a verb, got `{word}`"
         ));
     }
     // Written in two parts, so that this line is not a fault itself.
     if code.contains(concat!(".partial", "_cmp(")) {
-        faults.push(format!("{shown}: use total_cmp; a partial order panics or lies on NaN"));
+        faults.push(format!("{shown}: expected a total order of floats, got a partial one, which fails on NaN; use `total_cmp`"));
     }
     for title in cited_titles(code) {
         if !references.contains(&title) {
-            faults.push(format!("{shown}: \"{title}\" is cited, but not in docs/theory/references.md"));
+            faults.push(format!(
+                "{shown}: expected cited titles to be in docs/theory/references.md, got \"{title}\"; add it"
+            ));
         }
     }
     faults
@@ -201,10 +214,13 @@ fn readme_faults(folder: &Path) -> Vec<String> {
     let library = fs::read_to_string(folder.join("src/lib.rs")).unwrap_or_default();
     let mut faults = Vec::new();
     if readme.lines().count() < 5 {
-        faults.push(format!("{name}: a README of its own says what the crate is for"));
+        faults
+            .push(format!("{name}: expected a README of at least 5 lines; say there what the crate is for"));
     }
     if !library.contains("#![doc = include_str!(\"../README.md\")]") {
-        faults.push(format!("{name}: its README is not its documentation, so it will rot"));
+        faults.push(format!(
+            "{name}: expected the README as crate documentation; include it in src/lib.rs with `include_str!`"
+        ));
     }
     faults
 }
@@ -219,14 +235,17 @@ pub(crate) fn packages() -> Outcome {
                 || ["Cargo.toml", "Cargo.toml.orig", "Cargo.lock", "README.md", ".cargo_vcs_info.json"]
                     .contains(&file);
             if !expected {
-                faults.push(format!("{} would publish {file}", member.name));
+                faults.push(format!(
+                    "{}: expected a package of sources and README only, got {file}",
+                    member.name
+                ));
             }
         }
     }
     for fault in &faults {
         println!("{fault}");
     }
-    if faults.is_empty() { Ok(()) } else { Err("packages hold more than sources".into()) }
+    if faults.is_empty() { Ok(()) } else { Err("expected packages of sources only, got other files".into()) }
 }
 
 #[cfg(test)]

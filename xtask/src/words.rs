@@ -50,7 +50,7 @@ impl PublicTypes {
     pub(crate) fn doubled(&self) -> impl Iterator<Item = String> {
         self.0.iter().filter(|(_, places)| places.len() > 1).map(|(name, places)| {
             format!(
-                "{name}: {} public types share this name ({}); rename all but one",
+                "{name}: expected one public type of this name, got {} ({}); rename all but one",
                 places.len(),
                 places.join(", ")
             )
@@ -78,6 +78,9 @@ mod tests {
             "pub type Samples<'a> = &'a [f32];\nstruct Inner;\npub fn kind() {}\npub struct Kinds;\n",
         );
         let doubled: Vec<String> = types.doubled().collect();
-        assert_eq!(doubled, ["Samples: 2 public types share this name (a.rs, b.rs); rename all but one"]);
+        assert_eq!(
+            doubled,
+            ["Samples: expected one public type of this name, got 2 (a.rs, b.rs); rename all but one"]
+        );
     }
 }

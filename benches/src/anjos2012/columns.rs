@@ -98,8 +98,8 @@ pub fn table(text: &mut String, seed: u64) -> Result<(), Failure> {
     let over = PIXELS.map(|pixel| format!(" slices, t = {pixel}: mean | least to most |")).concat();
     writeln!(
         text,
-        "\n## Round columns (§4)\n\nColumns of radius {COLUMN}, approached from {WAYS} sides by a box of {} × {} × {}: the gap, in millimetres, between it and the true column where it is first stopped; negative is \
-         inside. Half-spacing boxes are cubes about every point, with half the mean distance of nearest points to each side.\n\n\
+        "\n## Round columns (§4)\n\nA box of {} × {} × {} approaches columns of radius {COLUMN} from {WAYS} directions. The table shows the gap between the box and the true column where the box is first stopped, in millimetres; negative gaps are \
+         inside. Half-spacing boxes are cubes around every point whose half side is half the mean distance of nearest points.\n\n\
          | points apart | half-spacing boxes: half a side | gap, mean | least to most |{over}\n| --: | --: |{}",
         2.0 * HALF,
         2.0 * HALF,

@@ -37,8 +37,8 @@ pub fn table(text: &mut String, walked: &Walked) -> Result<(), Failure> {
     };
     write!(
         text,
-        "\n## How high a box gets up the scan's staircase\n\nThe greatest height, to a centimetre, of a square box that stands on the highest thing under it. By the points: between that and the lowest point above it, \
-         along the way, and where there is most room within {ASIDE} to either side of it, which no way up can exceed. By walking: who arrives, climbing {} at once.\n\n| width |{}\n| --- |{}\n",
+        "\n## How high a box gets up the scan's staircase\n\nThe greatest height, to a centimetre, of a square box that stands on the highest point under it. By the points: the height from there to the lowest point above, \
+         along the route, and the greatest such height within {ASIDE} to either side of the route, which no route can exceed. By walking: the tallest box that arrives, with a climb of {}.\n\n| width |{}\n| --- |{}\n",
         AvatarOptions::default().climb,
         WIDTHS.map(|width| format!(" {width} |")).concat(),
         " --: |".repeat(WIDTHS.len()),
@@ -48,7 +48,7 @@ pub fn table(text: &mut String, walked: &Walked) -> Result<(), Failure> {
         writeln!(text, "| {name} |{cells}")
     };
     let free = WIDTHS.map(|width| room(&walked.cloud, &up, width));
-    row("by the points, along the way", &free.map(|[along, _]| along))?;
+    row("by the points, along the route", &free.map(|[along, _]| along))?;
     row("by the points, at most", &free.map(|[_, most]| most))?;
     let source = Source::Points(walked.cloud.clone());
     for pixel in PIXELS {

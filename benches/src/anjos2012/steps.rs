@@ -82,9 +82,9 @@ pub fn figures_5_and_6(
     maps: &Path,
 ) -> Result<(), Failure> {
     text.push_str(
-        "\n## Figs 5 and 6: memory and time of a walk over the number of slices kept\n\nUp the stairs and down again, a step a pixel, slices of 700 pixels. On the left slices so high that \
-         the avatar spans six, as in the paper, which keeps 10 or 16; on the right slices of three pixels. Nothing is loaded ahead unless said, as in the paper. Times are the least of \
-         seven walks for every step: slow is where a slice is read and decoded.\n\n![](figure-5.svg)\n\n![](figure-6.svg)\n\n\
+        "\n## Figs 5 and 6: memory and time of a walk over the number of slices kept\n\nThe walk goes up the stairs and down again, with one step for each pixel and slices of 700 pixels. On the left the avatar spans six slices, \
+         as in the paper, which keeps 10 or 16 of them. On the right slices are three pixels high. Slices are loaded ahead only where the table says so. Times are the minimum of \
+         seven walks for each step. Slow steps read and decode a slice.\n\n![](figure-5.svg)\n\n![](figure-6.svg)\n\n\
          | slice | slices | kept | ahead | MB, most | MB, mean | µs a step, mean | worst | steps above 50 µs | slices read late |\n| --: | --: | --: | --- | --: | --: | --: | --: | --: | --: |\n",
     );
     let tall = AvatarOptions::default().height / (SPANNED - 1.0);

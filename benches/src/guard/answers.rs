@@ -193,7 +193,7 @@ pub fn written(rows: &[Row]) -> String {
 pub fn read(text: &str) -> Result<Vec<Row>, Failure> {
     let mut lines = text.lines().enumerate();
     if lines.next().map(|(_, line)| line) != Some(HEADER) {
-        return Err(format!("expected the columns {HEADER}; record the answers anew").into());
+        return Err(format!("expected the columns {HEADER}, got others; record the answers again").into());
     }
     lines
         .map(|(number, line)| line.parse().map_err(|cause| format!("line {}: {cause}", number + 1).into()))

@@ -64,7 +64,9 @@ impl Scenario {
     /// When there is none.
     pub fn named(name: &str) -> Result<Self, Failure> {
         let known = Self::ALL.iter().find(|(_, known)| *known == name);
-        known.map(|(scenario, _)| *scenario).ok_or_else(|| format!("no scenario {name:?}").into())
+        known
+            .map(|(scenario, _)| *scenario)
+            .ok_or_else(|| format!("expected the name of a scenario, got {name:?}").into())
     }
 
     /// Prepares the scenario, then runs it once; valgrind counts the run only.
@@ -145,12 +147,12 @@ pub fn count(scenario: Scenario, program: &Path, arguments: &[&str]) -> Result<u
         .arg(program)
         .args(arguments)
         .output()
-        .map_err(|cause| format!("valgrind: {cause}; install it, package valgrind"))?;
+        .map_err(|cause| format!("cannot run valgrind ({cause}); install the package valgrind"))?;
     let told = String::from_utf8_lossy(&output.stderr);
     let collected = told.lines().find_map(|line| line.split("Collected :").nth(1));
     match collected.map(str::trim).and_then(|number| number.parse().ok()) {
         Some(count) if output.status.success() && count > 0 => Ok(count),
-        _ => Err(format!("expected a count, valgrind said:\n{told}").into()),
+        _ => Err(format!("expected a count from valgrind, got:\n{told}").into()),
     }
 }
 
@@ -215,7 +217,7 @@ fn hinted(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
     const STEPS: u32 = 10;
     let scan = &case.scans[0];
     let (plan, mut scratch) = (CollidePlan::new(options, scan, scan)?, Scratch::default());
-    let (still, step) = (scan.at(&Pose::IDENTITY), 0.1 * f64::from(scan.slices().sampling_radius));
+    let (still, step) = (scan.at(&Pose::IDENTITY), 0.1 * f64::from(scan.arrays().sampling_radius));
     let rng = &mut rng(1);
     let walks: Vec<(Pose, [f64; 3])> = case
         .questions

@@ -32,7 +32,7 @@ impl Makeup {
     /// # Errors
     /// When the scan cannot be written.
     pub fn of(scan: &Scan) -> Result<Self, Failure> {
-        let (slices, nodes) = (scan.slices(), scan.topology());
+        let (arrays, nodes) = (scan.arrays(), scan.topology());
         let mut depths = vec![0_u32; nodes.len()];
         for id in nodes.ids().take(nodes.inner()) {
             // Parents come before their children.
@@ -44,7 +44,7 @@ impl Makeup {
         let bytes = usize::try_from(scan.write_to(std::io::sink())?)?;
         Ok(Self {
             points: scan.len(),
-            samples: inner.map(|id| slices.samples(id).len()).sum(),
+            samples: inner.map(|id| arrays.samples(id).len()).sum(),
             nodes: nodes.len(),
             depth: depths.iter().map(|&d| f64::from(d)).sum::<f64>() / count(nodes.len()),
             bytes_a_point: count(bytes) / count(scan.len()),

@@ -56,8 +56,8 @@ fn bounds(t: &Triangle) -> Aabb {
     Aabb::new(corner(f64::min), corner(f64::max))
 }
 
-/// A motion in single precision, with precomputed values for comparing boxes.
-struct Motion {
+/// A relative pose in single precision, with precomputed values for comparing boxes.
+struct RelativePose {
     turn: Mat3A,
     back: Mat3A,
     spread: Mat3A,
@@ -66,7 +66,7 @@ struct Motion {
     slack: Vec3A,
 }
 
-impl Motion {
+impl RelativePose {
     fn new(pose: &Pose, slack: f32) -> Self {
         let columns = [0, 1, 2].map(|k| {
             let axis: [f64; 3] = std::array::from_fn(|i| pose.rotation()[(i, k)]);
@@ -104,14 +104,14 @@ impl Method for MeshTree {
 
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply {
         let pose = a.inverse().after(b);
-        let motion = Motion::new(&pose, self.slack);
-        if !motion.overlap(&self.root, &self.root) {
+        let relative = RelativePose::new(&pose, self.slack);
+        if !relative.overlap(&self.root, &self.root) {
             return Reply { node_pairs: 1, ..Reply::default() };
         }
         let node_pairs = Cell::new(1);
         let check = |a: &BvhNode, b: &BvhNode| {
             node_pairs.set(node_pairs.get() + 1);
-            motion.overlap(a, b)
+            relative.overlap(a, b)
         };
         let mut evaluations = 0;
         let hit = self.tree.leaf_pairs(&self.tree, check).any(|(i, j)| {

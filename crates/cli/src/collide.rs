@@ -386,13 +386,13 @@ fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2
         opening.open_both(kernel, args.pair.inputs())?
     };
     if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
-        let what = "--prove needs scans prepared for the euclidean kernel, got the geodesic kernel, which proves no \
-                    separation; prepare the scans again with `--kernel euclidean`";
+        let what = "--prove: expected scans prepared for the euclidean kernel, got the geodesic kernel, which proves \
+                    no separation; prepare the scans again with `--kernel euclidean`";
         return Err(CliError::Usage(what.into()));
     }
     if args.evidence == Some(EvidenceName::Certified) && scans[0].metric() == Metric::Geodesic {
         console::warn(
-            "--evidence certified: with the geodesic kernel no separation is proven, so separations are estimated",
+            "--evidence certified: the geodesic kernel proves no separation, so separations are estimated",
         );
     }
     Ok(scans)

@@ -64,7 +64,10 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
     for (i, path) in outputs.iter().enumerate() {
         output::check_apart(path, inputs)?;
         if outputs[..i].iter().any(|earlier| output::is_same(earlier, path)) {
-            return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
+            return Err(CliError::Usage(format!(
+                "{}: expected one output for each file, got two outputs; name another file",
+                path.display()
+            )));
         }
     }
     Ok(())
@@ -96,7 +99,7 @@ impl Grouped {
     /// Returns the number of contacts and the clashes, for people.
     pub(crate) fn lines(&self, contacts: &[Contact], unit: f64) -> Vec<String> {
         let head = format!(
-            "{} in {} (contacts up to {} apart are in one)",
+            "{} in {} (contacts up to {} apart are in one clash)",
             count(contacts.len() as u64, "contact"),
             clash_count(self.groups.len()),
             rough(self.link)

@@ -118,7 +118,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), CliError> {
             "expected points to write, got none of its {}; widen --crop or --class, or check the input",
             grouped_count(read, "point")
         );
-        return Err(CliError::Unfit { path: args.input.clone(), what });
+        return Err(CliError::UnsuitableFile { path: args.input.clone(), what });
     }
     let lost = format.loses(&survey);
     if !lost.is_empty() {
@@ -175,7 +175,7 @@ fn part(args: &ConvertArgs, points: PointPieces) -> Result<PointPieces, CliError
     let what =
         "expected a COPC file for --resolution, got a file that has no levels of detail; use `--voxel`"
             .into();
-    Err(CliError::Unfit { path: args.input.clone(), what })
+    Err(CliError::UnsuitableFile { path: args.input.clone(), what })
 }
 
 /// The results of the first pass over the points.
@@ -244,7 +244,7 @@ fn write(
     let path = &args.output;
     let refused = |error| match error {
         nearmiss::io::OutError::Io(cause) => CliError::writing(path)(cause),
-        error => CliError::Unfit { path: path.clone(), what: error.to_string() },
+        error => CliError::UnsuitableFile { path: path.clone(), what: error.to_string() },
     };
     replace_file(path, |file| {
         let file = file.try_clone().map_err(CliError::writing(path))?;
@@ -305,7 +305,7 @@ impl Steps<'_> {
             let what =
                 "expected points with classes for --class, got points that have no classes; leave it out"
                     .into();
-            return Err(CliError::Unfit { path: self.args.input.clone(), what });
+            return Err(CliError::UnsuitableFile { path: self.args.input.clone(), what });
         }
         let finite = |p: &[f64; 3]| p.iter().all(|x| x.is_finite());
         let not_finite = positions.iter().filter(|p| !finite(p)).count() as u64;

@@ -228,10 +228,10 @@ fn sentence(found: &Curves) -> String {
     let mut text = match (parts.is_empty(), touching) {
         (true, 0) => return "No curve found.".to_owned(),
         (true, _) => format!("They touch in {}", count(touching as u64, "point")),
-        (false, 0) => format!("They cut each other in {}", parts.join(" and ")),
+        (false, 0) => format!("They intersect in {}", parts.join(" and ")),
         (false, _) => {
             format!(
-                "They cut each other in {} and touch in {}",
+                "They intersect in {} and touch in {}",
                 parts.join(" and "),
                 count(touching as u64, "point")
             )
@@ -264,7 +264,7 @@ fn sentence(found: &Curves) -> String {
 
 /// Returns the reason why curves may be missing.
 fn unfinished(views: [&Placed<'_>; 2]) -> &'static str {
-    let is_finite = |view: &&Placed<'_>| view.placed().to_row_major().iter().all(|c| c.is_finite());
+    let is_finite = |view: &&Placed<'_>| view.stored_to_world().to_row_major().iter().all(|c| c.is_finite());
     if views.iter().all(is_finite) {
         "The budget ran out, so curves may be missing. Raise --budget or --work."
     } else {

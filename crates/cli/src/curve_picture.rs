@@ -212,10 +212,10 @@ fn write_legend(canvas: &mut Canvas, found: &Curves, style: &Style) {
         "No curve of intersection was found.".to_owned()
     } else {
         format!(
-            "The surfaces cut each other in {}, {closed}, {} long together.{}",
+            "The surfaces intersect in {}, {closed}, with a total length of {}.{}",
             count(found.curves.len() as u64, "curve"),
             style.unit.length(found.length()),
-            if found.complete { "" } else { " The search is unfinished: curves may be missing." }
+            if found.complete { "" } else { " The budget ran out, so curves may be missing." }
         )
     };
     legend::sentence(canvas, [left, top + legend::LINE], width, &told);

@@ -91,7 +91,7 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
         return Err(CliError::Usage(what));
     }
     let scan = Opening::new(true, console).open_with_graph(&args.a)?;
-    let base = poses::normalised(&scan).ok_or_else(|| CliError::Unfit {
+    let base = poses::normalised(&scan).ok_or_else(|| CliError::UnsuitableFile {
         path: args.a.clone(),
         what: "expected a scan with an extent, got points at one place only".into(),
     })?;
@@ -119,7 +119,7 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
                 rate(args.error),
                 rate(found.error)
             );
-            return Err(CliError::Unfit { path: args.a.clone(), what });
+            return Err(CliError::UnsuitableFile { path: args.a.clone(), what });
         }
         scan.with_density(found).save(&args.a)?;
     }

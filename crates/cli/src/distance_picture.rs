@@ -31,14 +31,14 @@ const END: f64 = 9.0;
 pub(crate) fn paint_distance(views: [&Placed<'_>; 2], found: &Distance, style: &Style) -> Picture {
     let told = if found.upper > 0.0 {
         let apart = bracket(found, unit(views));
-        format!("They are {apart}{}. The line joins the nearest places.", style.unit.aside())
+        format!("They are {apart}{}. The line joins the nearest points.", style.unit.aside())
     } else {
-        "They touch at the dot.".to_owned()
+        "They touch at the marked point.".to_owned()
     };
     let told = if style.points {
         told
     } else {
-        format!("{told} Gaps below {} cannot be told from contact.", style.unit.length(found.band))
+        format!("{told} Gaps below {} cannot be distinguished from contact.", style.unit.length(found.band))
     };
     paint_told(views, found, &told, style)
 }
@@ -52,7 +52,7 @@ pub(crate) fn paint_apart(
 ) -> Picture {
     let sure = if evidence == Evidence::Certified { "certified" } else { "estimated" };
     let told = format!(
-        "They do not touch ({sure}): {}{}. The line joins the nearest places.",
+        "They do not touch ({sure}): {}{}. The line joins the nearest points.",
         bracket(found, unit(views)),
         style.unit.aside()
     );

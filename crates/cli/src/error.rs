@@ -31,7 +31,7 @@ pub enum CliError {
     },
     /// A prepared scan is inconsistent.
     #[error("{}: {what}; prepare it again with `preprocess`", path.display())]
-    Insane {
+    CorruptScan {
         /// The file.
         path: PathBuf,
         /// The inconsistency.
@@ -119,7 +119,7 @@ pub enum CliError {
     },
     /// A file that was read, or a path, that is unsuitable.
     #[error("{}: {what}", path.display())]
-    Unfit {
+    UnsuitableFile {
         /// The file.
         path: PathBuf,
         /// The fault and a remedy.
@@ -159,7 +159,7 @@ impl CliError {
         let path = path.to_owned();
         move |error| match error {
             PlyError::Io { cause } => Self::writing(&path)(cause),
-            error => Self::Unfit { path, what: error.to_string() },
+            error => Self::UnsuitableFile { path, what: error.to_string() },
         }
     }
 

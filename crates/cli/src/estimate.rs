@@ -234,7 +234,7 @@ fn refuse(path: &Path, limit: Limit, what: &str, need: f64, remedies: &[String])
     }
     let or = if remedies.is_empty() { "" } else { "or " };
     let _ = write!(said, "{or}set --memory {} to run anyway", enough(need));
-    Err(CliError::Unfit { path: path.to_owned(), what: said })
+    Err(CliError::UnsuitableFile { path: path.to_owned(), what: said })
 }
 
 impl Limit {

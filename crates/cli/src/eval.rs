@@ -66,14 +66,14 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     if input::is_prepared(&args.points) {
         let what = "expected text with a line x y z for each point, got a prepared scan (by its content or name); \
                     check that the two files are not swapped";
-        return Err(CliError::Unfit { path: args.points.clone(), what: what.into() });
+        return Err(CliError::UnsuitableFile { path: args.points.clone(), what: what.into() });
     }
     let mut lines = TextLines::open(&args.points)?;
     // The points are read before the scan is opened, for a clear error if the two files are
     // swapped.
     let mut next = next_point(&mut lines)?;
     if next.is_none() {
-        return Err(lines.unfit("expected points, got none; a line is x y z"));
+        return Err(lines.unsuitable("expected points, got none; a line is x y z"));
     }
     let opening = Opening::new(args.verify, Console::new(false));
     let scan = match args.kernel {
@@ -117,7 +117,7 @@ fn kernel<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<Option<GeodesicKernel<'
             let missing = || {
                 let what = "expected a scan with close pairs for the geodesic kernel, got one without; prepare it \
                             again with `--close-pairs`";
-                CliError::Unfit { path: args.file.clone(), what: what.into() }
+                CliError::UnsuitableFile { path: args.file.clone(), what: what.into() }
             };
             scan.geodesic_kernel().ok_or_else(missing).map(Some)
         }
@@ -153,7 +153,7 @@ fn next_point(lines: &mut TextLines) -> Result<Option<[f64; 3]>, CliError> {
         if STARTS_OF_SCANS.iter().any(|start| text.starts_with(start)) {
             let what = "expected text with a line x y z for each point, got a scan; check that the two files are not \
                         swapped";
-            return Err(lines.unfit(what));
+            return Err(lines.unsuitable(what));
         }
         let mut columns = pieces(&text);
         let mut point = [0.0; 3];

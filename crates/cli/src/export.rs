@@ -96,7 +96,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     // Checked before anything is written.
     if args.close_pairs.is_some() && pairs.is_none() {
         let what = "expected a scan with close pairs, got one without; prepare it again with `--close-pairs`";
-        return Err(CliError::Unfit { path: args.file.clone(), what: what.into() });
+        return Err(CliError::UnsuitableFile { path: args.file.clone(), what: what.into() });
     }
     let console = Console::new(args.quiet);
     let wrote = |count: usize, what: &str, path: &Path| {
@@ -122,7 +122,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     let nodes = at_depth(&scan, &depths, args.level).count();
     if let (Some(path), Some(level)) = (&args.samples, args.level) {
         output::replace(path, |out| samples(&scan, level, out).map_err(CliError::writing_ply(path)))?;
-        let of_node = |node| scan.slices().samples(node).iter().count();
+        let of_node = |node| scan.arrays().samples(node).iter().count();
         wrote(at_depth(&scan, &depths, Some(level)).map(of_node).sum(), "sample", path);
     }
     if let Some(path) = &args.boxes {
@@ -177,18 +177,18 @@ pub(crate) fn at_depth<'a>(
 /// Writes the samples of all nodes at a depth, and of the leaves above it, with lengths in the
 /// units of the input.
 fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), PlyError> {
-    let (slices, frame) = (scan.slices(), scan.frame());
+    let (arrays, frame) = (scan.arrays(), scan.frame());
     let (mut positions, mut source, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
     let (mut covering, mut sampling) = (Vec::new(), Vec::new());
     #[expect(clippy::cast_possible_truncation, reason = "radii are single precision")]
     let length = |stored: f32| (f64::from(stored) * frame.scale) as f32;
     for node in at_depth(scan, &report::depths(scan), Some(level)) {
-        for i in slices.samples(node).iter() {
-            positions.push(frame.to_world(slices.position(i)));
+        for i in arrays.samples(node).iter() {
+            positions.push(frame.to_world(arrays.position(i)));
             source.push(scan.source()[i]);
             nodes.push(u32::try_from(node).unwrap_or(u32::MAX));
-            covering.push(length(slices.covering_radius(node)));
-            sampling.push(length(slices.sampling_radius_of(node)));
+            covering.push(length(arrays.covering_radius(node)));
+            sampling.push(length(arrays.sampling_radius_of(node)));
         }
     }
     let columns = [

@@ -139,12 +139,12 @@ impl FilterArgs {
         let mut step = |option: String, keep: Keep<'_>| -> Result<usize, CliError> {
             let before = cloud.len();
             let bar = console.spinner(format_args!("{option} of {}", grouped_count(before as u64, "point")));
-            let unfit = |what: &dyn Display| CliError::Unfit {
+            let unsuitable = |what: &dyn Display| CliError::UnsuitableFile {
                 path: path.to_owned(),
                 what: format!("{option}: {what}"),
             };
-            let kept = keep(cloud).map_err(|cause| unfit(&cause))?;
-            *cloud = cloud.select(&kept).map_err(|cause| unfit(&cause))?;
+            let kept = keep(cloud).map_err(|cause| unsuitable(&cause))?;
+            *cloud = cloud.select(&kept).map_err(|cause| unsuitable(&cause))?;
             drop(bar);
             let removed = before - cloud.len();
             let (shown, of) = (grouped(removed as u64), grouped_count(before as u64, "point"));

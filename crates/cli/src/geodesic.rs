@@ -105,7 +105,7 @@ pub fn geodesic_picture(scan: &Scan, from: usize) -> Option<Picture> {
             ),
         ],
         [
-            "The graph about the dot; red: virtual edges.".to_owned(),
+            "The graph around the dot; red: virtual edges.".to_owned(),
             format!(
                 "{}, {} of them virtual; {}.",
                 count(counts.edges as u64, "edge"),

@@ -51,8 +51,8 @@ fn exit_code(status: ExitStatus, file: &Path) -> ExitCode {
         return ExitCode::from(INTERRUPTED);
     }
     console::say_error(format_args!(
-        "{}: expected a file that can be decoded, got an abnormal end of the decoder ({status}), so the output is \
-         unchanged; write the file again if it is damaged, or free some memory",
+        "{}: expected a file that can be decoded, got a crash of the decoder ({status}); export the \
+         file again if it is damaged, or free some memory (the output is unchanged)",
         file.display()
     ));
     ExitCode::FAILURE

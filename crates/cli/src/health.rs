@@ -62,8 +62,8 @@ pub(crate) struct Holes {
 impl Health {
     pub(crate) fn new(scan: &Scan) -> Self {
         let survey = scan.survey(SEED);
-        let (scale, slices) = (scan.frame().scale, scan.slices());
-        let largest = (0..scan.len()).map(|i| slices.obstacle_ball(i)).fold(0.0, f32::max);
+        let (scale, arrays) = (scan.frame().scale, scan.arrays());
+        let largest = (0..scan.len()).map(|i| arrays.obstacle_ball(i)).fold(0.0, f32::max);
         let beyond: Vec<(f64, f64)> =
             survey.spacings.iter().copied().filter(|&(spacing, _)| spacing > scan.reach()).collect();
         let widths = &survey.holes;

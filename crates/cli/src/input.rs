@@ -147,7 +147,7 @@ impl Opening {
             let scan = self.open(path)?;
             if scan.graph().is_none() {
                 let what = "expected a scan with a graph, got one without; prepare it again with `--graph`";
-                return Err(CliError::Unfit { path: path.to_owned(), what: what.into() });
+                return Err(CliError::UnsuitableFile { path: path.to_owned(), what: what.into() });
             }
             return Ok(scan);
         }
@@ -202,7 +202,7 @@ pub(crate) fn check_raw(path: &Path) -> Result<(), CliError> {
         let what = "expected a point cloud or mesh, got a prepared scan (by its content or name); give the file that \
                     it was prepared from"
             .into();
-        return Err(CliError::Unfit { path: path.to_owned(), what });
+        return Err(CliError::UnsuitableFile { path: path.to_owned(), what });
     }
     Ok(())
 }
@@ -321,8 +321,8 @@ impl TextLines {
     }
 
     /// Returns an error about the file as a whole.
-    pub(crate) fn unfit(&self, what: impl Into<String>) -> CliError {
-        CliError::Unfit { path: self.path.clone(), what: what.into() }
+    pub(crate) fn unsuitable(&self, what: impl Into<String>) -> CliError {
+        CliError::UnsuitableFile { path: self.path.clone(), what: what.into() }
     }
 
     /// Returns an error about the line returned last.

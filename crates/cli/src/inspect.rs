@@ -42,7 +42,7 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), CliError> {
     let file = File::open(&args.file, Check::Structure).map_err(|e| loading()(e.into()))?;
     if args.verify {
         scan.sanity_check()
-            .map_err(|flaw| CliError::Insane { path: args.file.clone(), what: flaw.to_string() })?;
+            .map_err(|flaw| CliError::CorruptScan { path: args.file.clone(), what: flaw.to_string() })?;
     }
     let report = Report { format_version: file.version(), scan: ScanReport::new(&scan, file.byte_len()) };
     let mut results = Results::new();

@@ -55,7 +55,7 @@ pub fn level_picture(scan: &Scan, depths: &[u32]) -> Picture {
 
 /// Returns the covering radius of a node, in the units of the input.
 fn radius(scan: &Scan, node: usize) -> f64 {
-    f64::from(scan.slices().covering_radius(node)) * scan.frame().scale
+    f64::from(scan.arrays().covering_radius(node)) * scan.frame().scale
 }
 
 /// Paints the scan and the balls of `nodes`, with a margin for balls of radius `most`.
@@ -72,7 +72,7 @@ fn paint(canvas: &mut Canvas, scan: &Scan, nodes: &[usize], most: f64, area: Are
     let mut balls = Canvas::new(columns, rows, GROUND);
     let mut dots = Vec::new();
     for (k, &node) in nodes.iter().enumerate() {
-        for i in scan.slices().samples(node).iter() {
+        for i in scan.arrays().samples(node).iter() {
             let centre = Vector3::from(view.point(i));
             balls.ball(&camera, centre, radius(scan, node), OF_NODES[k % OF_NODES.len()]);
             dots.push(centre);
@@ -91,7 +91,7 @@ fn caption(canvas: &mut Canvas, scan: &Scan, depth: u32, nodes: &[usize], area: 
     let mut radii: Vec<f64> = nodes.iter().map(|&node| radius(scan, node) / scan.sampling_radius()).collect();
     radii.sort_unstable_by(f64::total_cmp);
     let median = radii.get(radii.len() / 2).map_or_else(String::new, |&r| short(r));
-    let samples: usize = nodes.iter().map(|&node| scan.slices().samples(node).len()).sum();
+    let samples: usize = nodes.iter().map(|&node| scan.arrays().samples(node).len()).sum();
     let lines = [
         format!("{} at depth {depth}, each in a colour", count(nodes.len() as u64, "node")),
         format!("dots: their {}", count(samples as u64, "sample")),

@@ -87,7 +87,7 @@ fn sentence([surfaces, obstacles]: [Verdict; 2], unit: f64) -> String {
     };
     let least = |gap: f64| {
         if gap > 0.0 {
-            format!("; at least {} apart (certified)", rounded_down(gap, unit))
+            format!("; they are at least {} apart (certified)", rounded_down(gap, unit))
         } else {
             " (certified)".into()
         }
@@ -97,21 +97,21 @@ fn sentence([surfaces, obstacles]: [Verdict; 2], unit: f64) -> String {
             let (place, within) = at(contact, evidence);
             let cut = of_surfaces.map_or_else(
                 || "No curve found".into(),
-                |gap| format!("The surfaces do not cut{}", least(gap)),
+                |gap| format!("The surfaces do not intersect{}", least(gap)),
             );
             format!("{cut}. But they touch at {place}, where no surface is sampled, {within}.")
         }
         (Some(of_surfaces), Verdict::Separated { gap, evidence: Evidence::Certified }) => {
-            format!("They do not cut{}.", least(gap.min(of_surfaces)))
+            format!("They do not intersect{}.", least(gap.min(of_surfaces)))
         }
         (None, Verdict::Separated { gap, evidence: Evidence::Certified }) => {
-            format!("No curve found, nor any contact{}.", least(gap))
+            format!("No curve and no contact found{}.", least(gap))
         }
         (_, Verdict::Separated { evidence: Evidence::Estimated, .. }) => {
-            "No curve found, nor any contact (estimated).".into()
+            "No curve and no contact found (estimated).".into()
         }
         (_, Verdict::Undecided(reason)) => {
-            format!("No curve found. Whether they touch cannot be told: {}.", why(reason))
+            format!("No curve found. Cannot tell if they touch: {}.", why(reason))
         }
     }
 }
@@ -119,10 +119,14 @@ fn sentence([surfaces, obstacles]: [Verdict; 2], unit: f64) -> String {
 /// Returns the reason in words.
 fn why(reason: Reason) -> &'static str {
     match reason {
-        Reason::Budget { .. } => "the budget ran out first; try a greater --budget or --work",
-        Reason::Undersampled => "they come near each other only where points are too sparse",
-        Reason::Ambiguous => "they come near each other only where points do not look like one sheet",
-        Reason::Pose => "a pose is not finite or makes one object vanish beside the other",
+        Reason::Budget { .. } => "the budget ran out; raise --budget or --work",
+        Reason::Undersampled => "they come near each other only where the points are too sparse",
+        Reason::Ambiguous => {
+            "they come near each other only where the points do not look like a single surface"
+        }
+        Reason::Pose => {
+            "a pose is not finite, or makes one scan vanishingly small beside the other; check the poses"
+        }
         _ => "`nearmiss collide` may say why",
     }
 }
@@ -164,7 +168,7 @@ mod tests {
         );
         assert_eq!(
             said(apart(0.2504, Certified), touch(Certified)),
-            "The surfaces do not cut; at least 0.250 apart (certified). But they touch at (1.000, 2.000, 3.000), where no \
+            "The surfaces do not intersect; they are at least 0.250 apart (certified). But they touch at (1.000, 2.000, 3.000), where no \
              surface is sampled, within 0.0004 (certified)."
         );
         assert!(
@@ -172,18 +176,18 @@ mod tests {
         );
         assert_eq!(
             said(apart(0.2504, Certified), apart(0.1254, Certified)),
-            "They do not cut; at least 0.125 apart (certified)."
+            "They do not intersect; they are at least 0.125 apart (certified)."
         );
-        assert_eq!(said(apart(0.0, Certified), apart(0.0, Certified)), "They do not cut (certified).");
+        assert_eq!(said(apart(0.0, Certified), apart(0.0, Certified)), "They do not intersect (certified).");
         assert_eq!(
             said(unknown, apart(0.1254, Certified)),
-            "No curve found, nor any contact; at least 0.125 apart (certified)."
+            "No curve and no contact found; they are at least 0.125 apart (certified)."
         );
-        assert_eq!(said(unknown, apart(0.0, Estimated)), "No curve found, nor any contact (estimated).");
+        assert_eq!(said(unknown, apart(0.0, Estimated)), "No curve and no contact found (estimated).");
         let budget = Verdict::Undecided(Reason::Budget { likelihood: 0.5 });
         assert_eq!(
             said(apart(0.2504, Certified), budget),
-            "No curve found. Whether they touch cannot be told: the budget ran out first; try a greater --budget or --work."
+            "No curve found. Cannot tell if they touch: the budget ran out; raise --budget or --work."
         );
     }
 }

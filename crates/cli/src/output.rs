@@ -11,27 +11,30 @@ use crate::error::CliError;
 
 /// Fails if no file can be written at `path`. Called before the work whose result goes there.
 pub(crate) fn check(path: &Path) -> Result<(), CliError> {
-    let unfit = |what: &str| Err(CliError::Unfit { path: path.to_owned(), what: what.to_owned() });
+    let unsuitable =
+        |what: &str| Err(CliError::UnsuitableFile { path: path.to_owned(), what: what.to_owned() });
     if is_stdout(path) {
-        return unfit("expected a file to write to, got standard output; name a file");
+        return unsuitable("expected a file to write to, got standard output; name a file");
     }
     match fs::metadata(path) {
         Ok(there) if there.is_dir() => {
-            return unfit("expected a file to write to, got a folder; name a file in it");
+            return unsuitable("expected a file to write to, got a folder; name a file in it");
         }
         Ok(there) if !there.is_file() => {
-            return unfit("expected a regular file to write to, got a device or pipe; name a regular file");
+            return unsuitable(
+                "expected a regular file to write to, got a device or pipe; name a regular file",
+            );
         }
         _ => {}
     }
     if path.file_name().is_none() {
-        return unfit("expected a file to write to, got a path without a file name; name a file");
+        return unsuitable("expected a file to write to, got a path without a file name; name a file");
     }
     let folder = folder(path);
     if folder.is_dir() {
         Ok(())
     } else {
-        unfit(&format!("there is no folder {}; create it first", folder.display()))
+        unsuitable(&format!("there is no folder {}; create it first", folder.display()))
     }
 }
 

@@ -50,8 +50,9 @@ const OPACITY: f64 = 0.6;
 pub(crate) fn check_name(path: &Path) -> Result<(), CliError> {
     match path.extension() {
         Some(extension) if !extension.eq_ignore_ascii_case("png") => Err(CliError::Usage(format!(
-            "{}: pictures are PNG; name a file that ends in .png",
-            path.display()
+            "{}: expected a file name that ends in .png, got .{}; pictures are PNG files",
+            path.display(),
+            extension.display()
         ))),
         _ => Ok(()),
     }
@@ -123,10 +124,10 @@ pub(crate) fn paint(views: [&Placed<'_>; 2], answer: &Answer, style: &Style) -> 
     let sure = |evidence| if evidence == Evidence::Certified { "certified" } else { "estimated" };
     let told = match answer.verdict {
         Verdict::Intersecting { evidence, .. } => {
-            format!("They touch at the ringed place ({}). {}", sure(evidence), close_told(style.points))
+            format!("They touch at the ringed point ({}). {}", sure(evidence), close_told(style.points))
         }
         Verdict::Separated { evidence, .. } => format!("They do not touch ({}).", sure(evidence)),
-        Verdict::Undecided(_) => "Whether they touch is undecided.".to_owned(),
+        Verdict::Undecided(_) => "It is undecided whether they touch.".to_owned(),
     };
     legend(&mut canvas, &told, &style.names);
     canvas.picture()
@@ -137,7 +138,7 @@ fn close_told(points: bool) -> &'static str {
     if points {
         "The close view shows the two points whose balls meet, and the line between them."
     } else {
-        "The close view is cut open there, dark along the cut; arrows are normals of the surfaces."
+        "The close view is cut open there, dark along the cut. The arrows are normals of the surfaces."
     }
 }
 
@@ -163,7 +164,7 @@ pub(crate) fn paint_both(
 /// Returns half the diagonal of a scan's bounding box, in the world.
 fn half_diagonal(view: &Placed<'_>) -> f64 {
     let half = Vector3::from(view.scan().bounds().half_extents());
-    half.norm() * view.placed().scale() / view.scan().frame().scale
+    half.norm() * view.stored_to_world().scale() / view.scan().frame().scale
 }
 
 /// Returns the disc of the `i`-th stored point in the world.
@@ -171,8 +172,8 @@ pub(crate) fn splat(view: &Placed<'_>, i: usize) -> Splat {
     let scan = view.scan();
     Splat {
         centre: view.point(i).into(),
-        normal: view.placed().rotate(scan.normals()[i].map(f64::from)).into(),
-        radius: f64::from(scan.discs().get(i)) * view.placed().scale(),
+        normal: view.stored_to_world().rotate(scan.normals()[i].map(f64::from)).into(),
+        radius: f64::from(scan.discs().get(i)) * view.stored_to_world().scale(),
     }
 }
 
@@ -187,7 +188,7 @@ pub(crate) fn obstacle(
     largest: f64,
 ) {
     let largest = largest / camera.scale;
-    let ball = f64::from(view.scan().slices().obstacle_ball(i)) * view.placed().scale();
+    let ball = f64::from(view.scan().arrays().obstacle_ball(i)) * view.stored_to_world().scale();
     if ball > 0.0 {
         canvas.ball(camera, view.point(i).into(), ball.min(largest).max(SEEN / camera.scale), colour);
     } else {
@@ -227,7 +228,8 @@ impl Close {
             Some(normals) => normals.map(Vector3::from),
             None => [0, 1].map(|k| splat(views[k], indices[k]).normal),
         };
-        let radius = |k: usize| f64::from(views[k].scan().radii()[indices[k]]) * views[k].placed().scale();
+        let radius =
+            |k: usize| f64::from(views[k].scan().radii()[indices[k]]) * views[k].stored_to_world().scale();
         let pair = style.points.then(|| [0, 1].map(|k| Vector3::from(views[k].point(indices[k]))));
         // A scan that is small compared with the spacing of the other fills the view.
         let small = half_diagonal(views[0]).min(half_diagonal(views[1]));

@@ -98,7 +98,7 @@ impl Stage {
     fn new(args: &PosesArgs, [a, b]: [&Scan; 2]) -> Result<Self, CliError> {
         let base = |path: &PathBuf, scan| {
             let what = "expected a scan with an extent, got points at one place only";
-            normalised(scan).ok_or_else(|| CliError::Unfit { path: path.clone(), what: what.into() })
+            normalised(scan).ok_or_else(|| CliError::UnsuitableFile { path: path.clone(), what: what.into() })
         };
         let [base_a, base_b] = [base(&args.a, a)?, base(&args.b, b)?];
         if args.normalise {
@@ -230,7 +230,7 @@ fn near(args: &PosesArgs, scans: [&Scan; 2], stage: &Stage, console: Console) ->
             Some(stage.line(&at(&turn, direction, d, &bases[1]), d, Some(offset)))
         });
         bar.advance(1);
-        line.ok_or_else(|| CliError::Unfit {
+        line.ok_or_else(|| CliError::UnsuitableFile {
             path: args.b.clone(),
             what: format!(
                 "expected contact with {}, got none in {TRIES} random directions; check that both scans sample \

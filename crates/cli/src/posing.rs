@@ -109,7 +109,8 @@ pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, C
     let path = Path::new(given);
     if path.is_file() {
         let text = std::fs::read_to_string(path).map_err(CliError::reading(path))?;
-        return pose_text::parse(&text).map_err(|what| CliError::Unfit { path: path.to_owned(), what });
+        return pose_text::parse(&text)
+            .map_err(|what| CliError::UnsuitableFile { path: path.to_owned(), what });
     }
     if pieces(given).nth(1).is_some() {
         return Err(CliError::Usage(format!("{option}: {what}")));
@@ -168,7 +169,7 @@ impl PoseFile {
         loop {
             let Some((number, text)) = self.lines.next_filled()? else {
                 if self.is_empty {
-                    return Err(self.lines.unfit(format!("expected poses, got none; {FILE_FORMS}")));
+                    return Err(self.lines.unsuitable(format!("expected poses, got none; {FILE_FORMS}")));
                 }
                 return Ok(None);
             };

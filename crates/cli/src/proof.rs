@@ -73,8 +73,8 @@ pub(crate) fn write(
     let contact = contact.filter(|_| evidence == Some(Evidence::Certified));
     let line = Line {
         query,
-        placed_a: views[0].placed().to_row_major(),
-        placed_b: views[1].placed().to_row_major(),
+        placed_a: views[0].stored_to_world().to_row_major(),
+        placed_b: views[1].stored_to_world().to_row_major(),
         margin: options.margin,
         semantics: match of {
             Semantics::Obstacle => "obstacle",

@@ -124,7 +124,7 @@ impl ScanReport {
             sampling_radius: scan.sampling_radius(),
             reach: scan.reach(),
             bandwidth: f64::from(scan.plan().bandwidth(median)) * scale,
-            horizon: f64::from(scan.plan().horizon(median)) * scale,
+            horizon: f64::from(scan.plan().support_radius(median)) * scale,
             support_min: scan.plan().options().support_min,
             nodes,
             leaves,

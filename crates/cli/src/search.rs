@@ -131,7 +131,7 @@ impl SearchArgs {
         if self.wants_graphs() && (lacks(a) || lacks(b)) {
             let which = if lacks(a) { "the first" } else { "the second" };
             return Err(CliError::Usage(format!(
-                "--method interpolation needs scans with a proximity graph, but {which} scan has none; prepare it again \
+                "--method interpolation: expected two scans with a proximity graph, got none in {which} scan; prepare it again \
                  with `--graph`, or use --method traversal"
             )));
         }
@@ -141,7 +141,7 @@ impl SearchArgs {
     /// Returns `options` with these options applied. `a` provides the stored density.
     pub(crate) fn apply(&self, options: CollideOptions, a: &Scan) -> Result<CollideOptions, CliError> {
         if self.flat && self.method == MethodName::Traversal {
-            let what = "--flat needs --method sampling or interpolation, got --method traversal; change the method, or leave out --flat";
+            let what = "--flat: expected --method sampling or interpolation, got --method traversal; change the method, or leave out --flat";
             return Err(CliError::Usage(what.into()));
         }
         let sampling = Sampling::default()

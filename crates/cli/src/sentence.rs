@@ -123,7 +123,7 @@ pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
 fn world_bounds(view: &Placed<'_>) -> Aabb {
     let frame = view.scan().frame();
     let to_stored = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - frame.origin[k]) / frame.scale);
-    Aabb::of(view.scan().bounds().corners().map(|p| view.placed().apply(to_stored(p))))
+    Aabb::of(view.scan().bounds().corners().map(|p| view.stored_to_world().apply(to_stored(p))))
 }
 
 /// Returns the reason for an undecided answer, with remedies.
@@ -176,5 +176,5 @@ pub(crate) fn why(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOpti
 
 /// Returns a scan's sampling radius, in world units.
 pub(crate) fn world_radius(view: &Placed<'_>) -> f64 {
-    view.scan().sampling_radius() * view.placed().scale() / view.scan().frame().scale
+    view.scan().sampling_radius() * view.stored_to_world().scale() / view.scan().frame().scale
 }

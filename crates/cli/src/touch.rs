@@ -178,7 +178,7 @@ impl ShapeFile {
     fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
         let line = self.lines.next_filled()?;
         if line.is_none() && self.is_empty {
-            return Err(self.lines.unfit(format!("expected shapes, got none; {SHAPE_LINE}")));
+            return Err(self.lines.unsuitable(format!("expected shapes, got none; {SHAPE_LINE}")));
         }
         self.is_empty = false;
         Ok(line)

@@ -113,7 +113,7 @@ impl SizeCheck {
         self.once.call_once(|| {
             let size = |view: &Placed<'_>| {
                 let scan = view.scan();
-                diagonal(scan.bounds()) * view.placed().scale() / scan.frame().scale
+                diagonal(scan.bounds()) * view.stored_to_world().scale() / scan.frame().scale
             };
             if let Some(question) = question(views.map(size), self.factors) {
                 self.console.note(format_args!("warning: {question}"));

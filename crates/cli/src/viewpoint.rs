@@ -242,7 +242,7 @@ fn has_level_floors(views: [&Placed<'_>; 2]) -> bool {
     let (view, [x, y, z]) =
         if size(sides[1]) > size(sides[0]) { (views[1], sides[1]) } else { (views[0], sides[0]) };
     let normals = || view.scan().normals().iter().step_by(stride(view));
-    let is_level = |normal: &&[f32; 3]| view.placed().rotate(normal.map(f64::from))[2].abs() > LEVEL;
+    let is_level = |normal: &&[f32; 3]| view.stored_to_world().rotate(normal.map(f64::from))[2].abs() > LEVEL;
     let (level, all) = (normals().filter(is_level).count(), normals().count());
     #[expect(clippy::cast_precision_loss, reason = "counts")]
     let has_floors = level as f64 > LEVEL_SHARE * all as f64;
@@ -302,7 +302,7 @@ fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> ([Vector3<f64>; 2
             *sum += v;
         }
     }
-    let [ca, cb] = views.map(|v| Vector3::from(v.placed().apply(v.scan().outline().discs.centre)));
+    let [ca, cb] = views.map(|v| Vector3::from(v.stored_to_world().apply(v.scan().outline().discs.centre)));
     let apart = (cb - ca).try_normalize(0.0).unwrap_or_default();
     let [_, wide, long] = symmetric_eigen(s).vectors;
     ([long, wide].map(Vector3::from), apart)

@@ -30,8 +30,8 @@ pub enum FilterError {
     },
     /// A voxel size so small that 64 bits cannot number the cells.
     #[error(
-        "expected a voxel size of at least {least:e}, got {size:e}; smaller cells at these coordinates \
-         cannot be numbered with 64 bits"
+        "expected a voxel size of at least {least:e}, got {size:e} (64 bits cannot number smaller cells at \
+         these coordinates); use a larger size"
     )]
     VoxelTooSmall {
         /// The voxel size given.
@@ -40,13 +40,13 @@ pub enum FilterError {
         least: f64,
     },
     /// A box with a corner that is NaN.
-    #[error("expected numbers as corners of the box, got NaN on axis {axis}")]
+    #[error("expected box corners without NaN, got NaN (axis {axis})")]
     BoxNotANumber {
         /// The first such axis, 0 to 2.
         axis: usize,
     },
     /// A box with `min` above `max`.
-    #[error("expected min ≤ max on every axis of the box, got {min} to {max} on axis {axis}; swap them")]
+    #[error("expected min ≤ max on every axis of the box, got {min} to {max} (axis {axis}); swap them")]
     EmptyBox {
         /// The first such axis, 0 to 2.
         axis: usize,
@@ -56,10 +56,12 @@ pub enum FilterError {
         max: f64,
     },
     /// A filter by class on points without classes.
-    #[error("the points have no classes; only LAS, LAZ and tables with a column `class` have them")]
+    #[error(
+        "expected points with classes, got points without; read them from LAS, LAZ or a table with a column `class`"
+    )]
     NoClasses,
     /// Too few points left for a cloud.
-    #[error("expected at least 8 points to stay, got {left} of {points}; {remedy}")]
+    #[error("expected at least 8 points to remain, got {left} of {points}; {remedy}")]
     TooFewLeft {
         /// Number of points that would stay.
         left: usize,

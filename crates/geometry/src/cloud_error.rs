@@ -8,20 +8,20 @@ use thiserror::Error;
 pub enum CloudError {
     /// A coordinate is NaN or infinite.
     #[error(
-        "point {index} has a coordinate that is not finite; use `PointCloud::cleaned` to drop such points"
+        "expected finite coordinates, got NaN or infinity (point {index}); drop such points with `PointCloud::cleaned`"
     )]
     NotFinite {
         /// Index of the first such point.
         index: usize,
     },
     /// A coordinate is so large that squared distances overflow.
-    #[error("point {index} has a coordinate beyond ±1e150; scale the input down")]
+    #[error("expected coordinates within ±1e150, got a larger one (point {index}); scale the input down")]
     TooLarge {
         /// Index of the first such point.
         index: usize,
     },
     /// Too few distinct finite points.
-    #[error("{distinct} distinct finite points of {given} given; at least 8 are needed")]
+    #[error("expected at least 8 distinct finite points, got {distinct} (of {given} given)")]
     TooFew {
         /// Number of distinct finite points.
         distinct: usize,
@@ -29,7 +29,7 @@ pub enum CloudError {
         given: usize,
     },
     /// More points than a 32-bit id can number.
-    #[error("{given} points; at most 4294967295 can be told apart by a 32-bit id")]
+    #[error("expected at most 4294967295 points, got {given}; split the input or thin it out")]
     TooMany {
         /// Number of points given.
         given: usize,

@@ -11,24 +11,27 @@ use crate::Aabb;
 #[non_exhaustive]
 pub enum PoseError {
     /// An entry is NaN or infinite.
-    #[error("entry {index} of the pose (row-major) is not finite")]
+    #[error("expected a finite number, got NaN or infinity (entry {index} of the pose, row-major)")]
     NotFinite {
         /// Index of the entry, 0 to 15.
         index: usize,
     },
     /// An entry is so large that squared distances overflow.
-    #[error("entry {index} of the pose (row-major) is beyond ±1e100")]
+    #[error("expected a number within ±1e100, got a larger one (entry {index} of the pose, row-major)")]
     TooLarge {
         /// Index of the entry, 0 to 15.
         index: usize,
     },
     /// The last row is not 0 0 0 1.
     #[error(
-        "the last row of the pose is not 0 0 0 1; matrices are row-major, translation in the last column"
+        "expected a last row of 0 0 0 1, got another one; give the pose row-major, with the translation in the \
+         last column"
     )]
     NotAffine,
     /// A linear part that mirrors or flattens space.
-    #[error("the pose has determinant {determinant}; a rotation with uniform scale has a positive one")]
+    #[error(
+        "expected a positive determinant, got {determinant}; give a rotation with uniform scale, without reflection"
+    )]
     NotProper {
         /// Determinant of the linear part.
         determinant: f64,
@@ -44,8 +47,8 @@ pub enum PoseError {
     },
     /// A linear part that shears or scales unevenly.
     #[error(
-        "the pose is not a rotation with uniform scale: the nearest one moves the object's bounds by {moved}, \
-         more than {tolerance} (a tenth of the sampling radius)"
+        "expected a rotation with uniform scale, got a pose whose nearest rotation moves the object's bounds by {moved}, \
+         more than {tolerance} (a tenth of the sampling radius); give its translation and a quaternion instead"
     )]
     NotRigid {
         /// Greatest move of a corner of the object's bounds, in world units.

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum MeshError {
     /// A triangle with a vertex index out of range.
-    #[error("triangle {triangle} names vertex {vertex}, but there are {vertices} vertices")]
+    #[error("expected a vertex index below {vertices}, got {vertex} (triangle {triangle})")]
     NoSuchVertex {
         /// Index of the triangle.
         triangle: usize,

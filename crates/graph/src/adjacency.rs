@@ -47,7 +47,10 @@ impl Adjacency {
             starts[i + 1] += starts[i];
         }
         let neighbours: Vec<u32> = ends.into_iter().map(|[_, to]| to).collect();
-        assert!(neighbours.iter().all(|&to| (to as usize) < count), "an edge leads to no point");
+        assert!(
+            neighbours.iter().all(|&to| (to as usize) < count),
+            "expected edges between points below {count}"
+        );
         Self { starts: starts.into(), neighbours: neighbours.into() }
     }
 
@@ -75,7 +78,7 @@ impl Adjacency {
     /// Panics if the numbers of points differ.
     #[must_use]
     pub(crate) fn union(&self, other: &Self) -> Self {
-        assert_eq!(self.len(), other.len(), "both over the same points");
+        assert_eq!(self.len(), other.len(), "expected two graphs over the same points");
         let mut starts = Vec::with_capacity(self.starts.len());
         let mut neighbours = Vec::with_capacity(self.neighbours.len() + other.neighbours.len());
         starts.push(0);

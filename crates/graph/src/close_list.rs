@@ -196,7 +196,7 @@ pub struct CloseList<'a> {
 impl CloseList<'_> {
     /// Returns the pair that is stored separately and precedes the last `left` pairs of the list.
     #[cold]
-    fn unfit(&mut self, left: usize) -> Close {
+    fn stored_separately(&mut self, left: usize) -> Close {
         let pair = (self.end as usize).wrapping_sub(left + 1);
         let is_before = |beside: &Beside| (beside.pair as usize) < pair;
         // Except for the first, the next pair is at the front.
@@ -221,7 +221,7 @@ impl Iterator for CloseList<'_> {
     fn next(&mut self) -> Option<Close> {
         let (&offset, &code) = (self.offsets.next()?, self.codes.next()?);
         if offset == BESIDE {
-            return Some(self.unfit(self.offsets.len()));
+            return Some(self.stored_separately(self.offsets.len()));
         }
         let point = self.own.wrapping_add_signed(offset.into());
         Some(Close { point, distance: unpack(self.floor, code) })

@@ -77,9 +77,9 @@ impl ClosePairs {
     /// Panics if the number of support radii differs from the number of points, or if there are 2³²
     /// pairs or more.
     #[must_use]
-    pub fn build(network: Network<'_>, horizons: &[f32], paths: Paths) -> Self {
+    pub fn build(network: Network<'_>, support_radii: &[f32], paths: Paths) -> Self {
         let count = network.len();
-        assert_eq!(count, horizons.len(), "a horizon a point");
+        assert_eq!(count, support_radii.len(), "expected a support radius for each point");
         let length = count.div_ceil(STRETCHES).max(1);
         let stretches = ranges_with(
             count,
@@ -89,7 +89,7 @@ impl ClosePairs {
                 let mut ends = Vec::with_capacity(sources.len());
                 let mut reached = Vec::new();
                 for source in sources {
-                    spread.within(network, id32(source), horizons[source], &mut reached);
+                    spread.within(network, id32(source), support_radii[source], &mut reached);
                     ends.push(reached.len());
                 }
                 (ends, reached)
@@ -103,7 +103,7 @@ impl ClosePairs {
                 starts[found.point as usize + 1] += 1;
             }
         }
-        assert!(u32::try_from(total).is_ok(), "{total} pairs are more than a list can number");
+        assert!(u32::try_from(total).is_ok(), "expected fewer than 2^32 close pairs, got {total}");
         for i in 0..count {
             starts[i + 1] += starts[i];
         }

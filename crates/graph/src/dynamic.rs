@@ -16,7 +16,7 @@ use nearmiss_lanes::vector::distance_sq;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use crate::influence::{distance, horizon, influence, radii_sq};
+use crate::influence::{distance, influence, radii_sq, support_radius};
 use crate::options::{GraphError, GraphOptions, check_positions};
 
 type Point = GeomWithData<[f32; 3], u32>;
@@ -246,7 +246,7 @@ impl DynamicGraph {
 
 /// Returns the bounding box of a sphere of influence.
 fn about(position: [f32; 3], radius_sq: f32) -> Rectangle<[f32; 3]> {
-    let reach = horizon(radius_sq);
+    let reach = support_radius(radius_sq);
     // Beside a large coordinate, the radius itself may be lost in rounding.
     let low = position.map(|c| (c - reach).next_down());
     Rectangle::from_corners(low, position.map(|c| (c + reach).next_up()))

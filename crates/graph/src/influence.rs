@@ -9,7 +9,7 @@
 //! whatever the rounding. Equal distances on a grid stay equal if the differences are exact, and
 //! points at such a tie are joined. Distances below 1e-19 count as zero.
 
-use nearmiss_index::{BlockBoxes, Heard, Nearest, PointBlock};
+use nearmiss_index::{BlockBoxes, Nearest, Overlaps, PointBlock};
 use nearmiss_lanes::parallel::ranges;
 use nearmiss_lanes::vector::distance_sq;
 use nearmiss_surface::Level;
@@ -28,7 +28,7 @@ pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
 /// Returns a search radius slightly greater than `d_i`, given `d_i²`, so that rounding does not
 /// lose a neighbour.
 #[inline]
-pub(crate) fn horizon(radius_sq: f32) -> f32 {
+pub(crate) fn support_radius(radius_sq: f32) -> f32 {
     radius_sq.sqrt() * (1.0 + 1e-6) + 1e-19
 }
 
@@ -52,22 +52,22 @@ pub(crate) fn radii_sq(positions: &[[f32; 3]], neighbours: u32) -> Vec<f32> {
 
 /// Returns the graph, given the spheres.
 pub(crate) fn influence(positions: &[[f32; 3]], radii_sq: &[f32]) -> Result<Adjacency, GraphError> {
-    let blocks = blocks(positions, |i| horizon(radii_sq[i]));
+    let blocks = blocks(positions, |i| support_radius(radii_sq[i]));
     let boxes = BlockBoxes::new(&blocks, positions.len());
     let tree = boxes.over(&blocks);
     let level = Level::new();
     let radius = |i: usize| f64::from(radii_sq[i]).sqrt();
     let parts = ranges(blocks.len(), |range| {
-        let (mut heard, mut lists) = (Heard::default(), Lists::default());
+        let (mut overlapping, mut lists) = (Overlaps::default(), Lists::default());
         for block in range {
-            tree.heard(level, block, &mut heard);
+            tree.overlapping(level, block, &mut overlapping);
             for i in block * WIDTH..((block + 1) * WIDTH).min(positions.len()) {
                 let (p, own) = (positions[i], radius(i));
                 let joined = |&&j: &&u32| {
                     let j = j as usize;
                     j != i && distance(p, positions[j]) <= own + radius(j)
                 };
-                lists.push(heard.at(i % WIDTH).iter().filter(joined).copied());
+                lists.push(overlapping.at(i % WIDTH).iter().filter(joined).copied());
             }
         }
         lists
@@ -75,15 +75,15 @@ pub(crate) fn influence(positions: &[[f32; 3]], radii_sq: &[f32]) -> Result<Adja
     Adjacency::from_lists(parts)
 }
 
-/// Returns the points in blocks, with `horizon` as support radius.
-fn blocks(positions: &[[f32; 3]], horizon: impl Fn(usize) -> f32) -> Vec<PointBlock> {
+/// Returns the points in blocks, with these support radii.
+fn blocks(positions: &[[f32; 3]], support_radius: impl Fn(usize) -> f32) -> Vec<PointBlock> {
     let mut blocks = vec![PointBlock::EMPTY; positions.len().div_ceil(WIDTH)];
     for (i, p) in positions.iter().enumerate() {
         let (block, lane) = (&mut blocks[i / WIDTH], i % WIDTH);
         for k in 0..3 {
             block.position[k][lane] = p[k];
         }
-        block.horizon[lane] = horizon(i);
+        block.support_radius[lane] = support_radius(i);
     }
     blocks
 }

@@ -64,7 +64,7 @@ pub struct KernelScratch {
     both: Vec<Both>,
     /// Close lists of the ends of an edge.
     ends: [Vec<Close>; 2],
-    heard: Vec<Close>,
+    supporting: Vec<Close>,
     blocks: Vec<MeasuredBlock>,
 }
 
@@ -80,7 +80,7 @@ impl KernelScratch {
     #[must_use]
     pub fn at(level: Level) -> Self {
         let (place, both, ends) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
-        Self { level, place, both, ends, heard: Vec::new(), blocks: Vec::new() }
+        Self { level, place, both, ends, supporting: Vec::new(), blocks: Vec::new() }
     }
 }
 
@@ -98,7 +98,11 @@ impl<'a> GeodesicKernel<'a> {
         graph: &'a Adjacency,
         pairs: &'a ClosePairs,
     ) -> Self {
-        assert_eq!([positions.len(), radii.len(), graph.len()], [pairs.len(); 3], "one of each a point");
+        assert_eq!(
+            [positions.len(), radii.len(), graph.len()],
+            [pairs.len(); 3],
+            "expected a position, a radius and two lists for each point"
+        );
         let (starts, neighbours) = graph.slices();
         Self { plan, positions, radii, starts, neighbours, lists: pairs.view() }
     }
@@ -139,18 +143,19 @@ impl<'a> GeodesicKernel<'a> {
     ///
     /// # Panics
     /// Panics if an end of `foot` is not a point.
-    pub fn hear<'s>(&self, foot: &Foot, scratch: &'s mut KernelScratch) -> &'s [Close] {
-        let KernelScratch { place, both, ends: [first, second], heard, .. } = scratch;
+    pub fn find_supporting<'s>(&self, foot: &Foot, scratch: &'s mut KernelScratch) -> &'s [Close] {
+        let KernelScratch { place, both, ends: [first, second], supporting, .. } = scratch;
         both.clear();
-        heard.clear();
+        supporting.clear();
         // No distance, not even one from a forged file, is less than this support radius of a
         // missing point.
-        let horizon =
-            |point: u32| self.radii.get(point as usize).map_or(f32::NEG_INFINITY, |&r| self.plan.horizon(r));
+        let support_radius = |point: u32| {
+            self.radii.get(point as usize).map_or(f32::NEG_INFINITY, |&r| self.plan.support_radius(r))
+        };
         self.lists.read(foot.ends[0] as usize, first);
         if foot.share <= 0.0 {
-            heard.extend(first.iter().filter(|close| close.distance < horizon(close.point)));
-            return heard;
+            supporting.extend(first.iter().filter(|close| close.distance < support_radius(close.point)));
+            return supporting;
         }
         if place.len() < self.positions.len() {
             place.resize(self.positions.len(), 0);
@@ -175,12 +180,12 @@ impl<'a> GeodesicKernel<'a> {
         }
         #[expect(clippy::cast_possible_truncation, reason = "a share")]
         let share = foot.share as f32;
-        heard.extend(both.iter().filter_map(|&Both { point, distances: [a, b] }| {
+        supporting.extend(both.iter().filter_map(|&Both { point, distances: [a, b] }| {
             let along = |own: f32, other: f32| if own < f32::INFINITY { own } else { other + foot.length };
             let distance = (1.0 - share) * along(a, b) + share * along(b, a);
-            (distance < horizon(point)).then_some(Close { point, distance })
+            (distance < support_radius(point)).then_some(Close { point, distance })
         }));
-        heard
+        supporting
     }
 
     /// Evaluates f at `x`, whose nearest point is `nearest`.
@@ -192,7 +197,7 @@ impl<'a> GeodesicKernel<'a> {
     /// Panics if `nearest` is not a point.
     pub fn evaluate(&self, x: [f64; 3], nearest: u32, scratch: &mut KernelScratch) -> Evaluation {
         let foot = self.foot(x, nearest);
-        self.hear(&foot, scratch);
+        self.find_supporting(&foot, scratch);
         self.sum(x, scratch)
     }
 
@@ -203,22 +208,22 @@ impl<'a> GeodesicKernel<'a> {
     /// Panics if `i` is not a point.
     pub fn evaluate_at<'s>(&self, i: u32, scratch: &'s mut KernelScratch) -> (Evaluation, &'s [Close]) {
         // The foot is the point itself, so its own list suffices.
-        self.hear(&Foot { ends: [i; 2], share: 0.0, length: 0.0 }, scratch);
+        self.find_supporting(&Foot { ends: [i; 2], share: 0.0, length: 0.0 }, scratch);
         let at = self.sum(self.positions[i as usize].map(f64::from), scratch);
-        (at, &scratch.heard)
+        (at, &scratch.supporting)
     }
 
-    /// Evaluates f at `x` with the points of the last [`Self::hear`].
+    /// Evaluates f at `x` with the points of the last [`Self::find_supporting`].
     fn sum(&self, x: [f64; 3], scratch: &mut KernelScratch) -> Evaluation {
-        let KernelScratch { level, heard, blocks, .. } = scratch;
+        let KernelScratch { level, supporting, blocks, .. } = scratch;
         blocks.clear();
-        for some in heard.chunks(PointBlock::WIDTH) {
+        for some in supporting.chunks(PointBlock::WIDTH) {
             let mut block = MeasuredBlock::EMPTY;
             for (lane, close) in some.iter().enumerate() {
                 // Points found have a radius, so they have a position.
                 let i = close.point as usize;
-                let horizon = self.plan.horizon(self.radii[i]);
-                self.plan.put(&mut block.points, lane, self.positions[i], horizon);
+                let support_radius = self.plan.support_radius(self.radii[i]);
+                self.plan.put(&mut block.points, lane, self.positions[i], support_radius);
                 block.distance[lane] = close.distance;
             }
             blocks.push(block);

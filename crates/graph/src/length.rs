@@ -20,7 +20,7 @@ impl<'a> Network<'a> {
     #[must_use]
     pub fn new(graph: &'a Adjacency, lengths: &'a [f32]) -> Self {
         let (starts, neighbours) = graph.slices();
-        assert_eq!(neighbours.len(), lengths.len(), "a length for each entry");
+        assert_eq!(neighbours.len(), lengths.len(), "expected a length for each end of an edge");
         Self { starts, neighbours, lengths }
     }
 

@@ -262,7 +262,9 @@ impl LevelCells {
         let (starts, neighbours) = self.graph.slices();
         let first = starts[from as usize] as usize;
         let others = &neighbours[first..starts[from as usize + 1] as usize];
-        let Ok(place) = others.binary_search(&to) else { panic!("cells {from} and {to} do not touch") };
+        let Ok(place) = others.binary_search(&to) else {
+            panic!("expected adjacent cells, got {from} and {to}")
+        };
         let [near, far] = self.crossings[first + place];
         // The centre, the last point of the walk inwards, is already in `path`.
         let first = path.len();
@@ -369,7 +371,7 @@ impl Levels {
     /// Panics if the number of radii differs from the number of points.
     #[must_use]
     pub fn build(network: Network<'_>, radii: &[f32]) -> Self {
-        assert_eq!(network.len(), radii.len(), "a radius a point");
+        assert_eq!(network.len(), radii.len(), "expected a radius for each point");
         let mut scratch = GeodesicScratch::default();
         let mut cells: Vec<LevelCells> = Vec::new();
         loop {

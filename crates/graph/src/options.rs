@@ -92,30 +92,34 @@ impl GraphOptions {
 #[non_exhaustive]
 pub enum GraphError {
     /// An r that is not between 1 and 32.
-    #[error("spheres of influence up to the neighbour of rank {0}; it must lie between 1 and 32")]
+    #[error("expected 1 to 32 neighbours for spheres of influence, got {0}")]
     Neighbours(u32),
     /// A k that is not between 0 and a million.
-    #[error("a fence of {0} interquartile ranges; it must lie between 0 and 1000000")]
+    #[error("expected a pruning fence of 0 to 1000000 interquartile ranges, got {0}")]
     Prune(f64),
     /// A coordinate that is not finite, or too large to be squared in single precision.
     #[error(
-        "point {index} has a coordinate that is not finite or beyond ±1e18; drop it or scale the input down"
+        "expected finite coordinates within ±1e18, got another (point {index}); drop the point or scale the input down"
     )]
     Coordinate {
         /// Index of the first such point.
         index: usize,
     },
     /// A scanner position that is not finite.
-    #[error("the scanner at {0:?}; its coordinates must be finite")]
+    #[error("expected finite coordinates of the scanner, got {0:?}")]
     Scanner([f64; 3]),
     /// More points, or more ends of edges, than 32 bits can number.
-    #[error("{ends} ends of edges; at most 4294967295 can be stored; choose fewer neighbours")]
+    #[error(
+        "expected at most 4294967295 points or ends of edges, got {ends}; use fewer points or neighbours"
+    )]
     TooLarge {
         /// Number of points or of ends of edges.
         ends: usize,
     },
     /// A geodesic kernel requested of a graph without a map of close pairs.
-    #[error("the geodesic kernel measures by a graph's map of close pairs; build the graph with that map")]
+    #[error(
+        "expected a graph with close pairs for the geodesic kernel, got one without; build it with close pairs"
+    )]
     NoClosePairs,
 }
 

@@ -68,7 +68,7 @@ pub fn orient(
 ) -> Orientation {
     let count = graph.len();
     let lengths = [positions.len(), radii.len(), normals.len(), sides.normals.map_or(count, <[_]>::len)];
-    assert_eq!(lengths, [count; 4], "one of each a point");
+    assert_eq!(lengths, [count; 4], "expected a position, a radius and a normal for each point");
     let mut tree = Tree::new(count);
     let edges = strongest_first(graph, positions, normals);
     let (smooth, rest) = edges.split_at(edges.partition_point(|edge| edge.along() >= SMOOTH));

@@ -7,6 +7,7 @@ use crate::Adjacency;
 use crate::close_list::{BESIDE, is_floor, pack, rounded};
 use crate::close_pairs::ClosePairs;
 use crate::levels::{LevelCells, Levels};
+use crate::sanity::ListNames;
 
 /// Part 0 belongs to the points, part k to the cells of level k.
 const LIST_STARTS: [u8; 4] = *b"CPST";
@@ -26,9 +27,10 @@ const LENGTHS: [u8; 4] = *b"CLEN";
 const CROSSINGS: [u8; 4] = *b"CCRS";
 const RADII: [u8; 4] = *b"CRAD";
 
-const LISTS: &str = "the list of close pairs of point";
+const LISTS: &str = "lists of close pairs";
+const LIST: &str = "the list of close pairs of point";
 const CELL: &str = "the cell of point";
-const EDGES: &str = "the edges of cell";
+const EDGES: ListNames = ListNames { array: "edges of cells", item: "the edges of cell" };
 
 impl ClosePairs {
     /// Adds the arrays to a container; `part` distinguishes several maps.
@@ -62,7 +64,7 @@ impl ClosePairs {
     pub fn load(
         file: &File,
         part: u32,
-        (points, horizon): (usize, impl Fn(usize) -> f32),
+        (points, support_radius): (usize, impl Fn(usize) -> f32),
         check: Check,
     ) -> Result<Self, LoadError> {
         let onward = if file.has(ONWARD, part) { file.array(ONWARD, part)? } else { Array::default() };
@@ -76,7 +78,7 @@ impl ClosePairs {
         };
         map.check_structure(points)?;
         if check == Check::Full {
-            map.check_contents(points, horizon)?;
+            map.check_contents(points, support_radius)?;
         }
         Ok(map)
     }
@@ -90,13 +92,13 @@ impl ClosePairs {
         }
         // With valid floors, every code is a valid distance.
         Flaw::length("floors of close pairs", self.floors.len(), points)?;
-        Flaw::first(LISTS, self.floors.iter().position(|&floor| !is_floor(floor)))?;
+        Flaw::first(LIST, self.floors.iter().position(|&floor| !is_floor(floor)))?;
         let starts: &[u32] = &self.starts;
         let descends = starts.windows(2).position(|two| two[0] > two[1]);
-        Flaw::first(LISTS, descends.or((starts[0] != 0).then_some(0)))
+        Flaw::first(LIST, descends.or((starts[0] != 0).then_some(0)))
     }
 
-    fn check_contents(&self, points: usize, horizon: impl Fn(usize) -> f32) -> Result<(), Flaw> {
+    fn check_contents(&self, points: usize, support_radius: impl Fn(usize) -> f32) -> Result<(), Flaw> {
         let (view, floors): (_, &[u8]) = (self.view(), &self.floors);
         let mut beside = self.beside.iter();
         for (i, own) in (0..self.len()).zip(0..) {
@@ -108,15 +110,15 @@ impl ClosePairs {
                     is_sound &= beside.next().is_some_and(|b| b.pair == pair) && !fits;
                 }
                 let point = close.point as usize;
-                let is_heard = point < points && close.distance <= rounded(horizon(point));
+                let is_within = point < points && close.distance <= rounded(support_radius(point));
                 let is_own = close.point == own && close.distance.to_bits() == 0;
                 let is_first = pair == pairs.start;
-                is_sound &= (is_heard || is_own) && is_own == is_first && before <= close.distance;
+                is_sound &= (is_within || is_own) && is_own == is_first && before <= close.distance;
                 before = close.distance;
             }
-            Flaw::first(LISTS, (!is_sound).then_some(i))?;
+            Flaw::first(LIST, (!is_sound).then_some(i))?;
         }
-        Flaw::length("close pairs that stand beside", self.beside.len(), self.beside.len() - beside.len())
+        Flaw::length("close pairs stored separately", self.beside.len(), self.beside.len() - beside.len())
     }
 }
 
@@ -198,7 +200,7 @@ impl LevelCells {
     fn check_structure(&self, finer: usize) -> Result<(), Flaw> {
         Flaw::length("cells", self.owner.len(), finer)?;
         Flaw::length("distances within cells", self.to_centre.len(), finer)?;
-        Flaw::length("ways within cells", self.inwards.len(), finer)?;
+        Flaw::length("paths within cells", self.inwards.len(), finer)?;
         Flaw::length("radii of cells", self.radii.len(), self.len())?;
         self.graph.check_structure(self.len(), EDGES)?;
         Flaw::length("lengths of edges between cells", self.lengths.len(), self.graph.neighbours.len())?;
@@ -229,7 +231,7 @@ impl LevelCells {
                 .zip(&mut crossings)
                 .any(|(&other, &[near, far])| !is_owned(near, cell) || !is_owned(far, other))
         });
-        Flaw::first(EDGES, wrong)
+        Flaw::first(EDGES.item, wrong)
     }
 
     fn check_contents(&self) -> Result<(), Flaw> {

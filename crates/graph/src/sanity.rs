@@ -6,19 +6,28 @@ use nearmiss_store::Flaw;
 use crate::adjacency::Adjacency;
 use crate::graph::PointGraph;
 
-const EDGES: &str = "the edges of point";
-const VIRTUAL: &str = "the virtual edges of point";
+const EDGES: ListNames = ListNames { array: "edges", item: "the edges of point" };
+const VIRTUAL: ListNames = ListNames { array: "virtual edges", item: "the virtual edges of point" };
 const COMPONENT: &str = "the component of point";
+
+/// The names of lists in error messages.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ListNames {
+    /// The name of the array.
+    pub(crate) array: &'static str,
+    /// The name of one list, before its index.
+    pub(crate) item: &'static str,
+}
 
 impl Adjacency {
     /// Checks that there are lists for `points` points, each of them ascending and holding indices
     /// of other points in range. Takes one pass.
-    pub(crate) fn check_structure(&self, points: usize, what: &'static str) -> Result<(), Flaw> {
-        let wrong = |index| Err(Flaw::Value { what, index });
-        Flaw::length(what, self.starts.len(), points + 1)?;
+    pub(crate) fn check_structure(&self, points: usize, names: ListNames) -> Result<(), Flaw> {
+        let wrong = |index| Err(Flaw::Value { what: names.item, index });
+        Flaw::length(names.array, self.starts.len(), points + 1)?;
         let end = self.starts[points] as usize;
         if self.starts[0] != 0 || end != self.neighbours.len() {
-            return Err(Flaw::Length { array: what, found: self.neighbours.len(), expected: end });
+            return Err(Flaw::Length { array: names.array, found: self.neighbours.len(), expected: end });
         }
         for i in 0..points {
             let (first, end) = (self.starts[i] as usize, self.starts[i + 1] as usize);
@@ -53,10 +62,10 @@ impl PointGraph {
     /// edges.
     pub(crate) fn check_structure(&self, points: usize) -> Result<(), Flaw> {
         let lengths = [
-            ("the radii of influence", self.radii.len()),
-            ("the longest edges", self.reaches.len()),
-            ("the components", self.components.len()),
-            ("the borders", self.borders.len()),
+            ("radii of influence", self.radii.len()),
+            ("longest edges", self.reaches.len()),
+            ("components", self.components.len()),
+            ("borders", self.borders.len()),
         ];
         for (array, found) in lengths {
             Flaw::length(array, found, points)?;
@@ -82,8 +91,8 @@ impl PointGraph {
     /// over points and edges.
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
         let wrong = |what, index| Err(Flaw::Value { what, index });
-        self.edges.check_symmetry(EDGES)?;
-        self.virtual_edges.check_symmetry(VIRTUAL)?;
+        self.edges.check_symmetry(EDGES.item)?;
+        self.virtual_edges.check_symmetry(VIRTUAL.item)?;
         let is_length = |length: f32| length.is_finite() && length >= 0.0;
         for i in 0..self.len() {
             if !is_length(self.radii[i]) {
@@ -93,14 +102,14 @@ impl PointGraph {
                 return wrong("the longest edge of point", i);
             }
             if self.borders[i] > 1 {
-                return wrong("the border at point", i);
+                return wrong("the border flag of point", i);
             }
             let own = self.components[i];
             if self.edges.of(i).iter().any(|&j| self.components[j as usize] != own) {
                 return wrong(COMPONENT, i);
             }
             if self.virtual_edges.of(i).iter().any(|j| self.edges.of(i).binary_search(j).is_ok()) {
-                return wrong(VIRTUAL, i);
+                return wrong(VIRTUAL.item, i);
             }
         }
         Ok(())
@@ -129,7 +138,7 @@ mod tests {
         for wrong in [[1, 1], [2, 1], [0, 1], [1, 4]] {
             assert!(!structure([&wrong, &[0], &[0], &[]]), "{wrong:?}");
         }
-        let symmetric = |of| lists(of).check_symmetry(EDGES).is_ok();
+        let symmetric = |of| lists(of).check_symmetry(EDGES.item).is_ok();
         assert!(symmetric([&[1, 2], &[0], &[0, 3], &[2]]), "a graph");
         assert!(!symmetric([&[1], &[], &[3], &[2]]), "an edge with one end");
         assert!(!symmetric([&[1], &[2], &[3], &[0]]), "as many edges in as out");

@@ -34,8 +34,8 @@ pub struct SurfaceSamples<'a> {
 }
 
 /// Returns the support radii of samples with these local sampling radii.
-fn horizons(plan: &SurfacePlan, radii: &[f32]) -> Vec<f32> {
-    radii.iter().map(|&r| plan.horizon(r)).collect()
+fn support_radii(plan: &SurfacePlan, radii: &[f32]) -> Vec<f32> {
+    radii.iter().map(|&r| plan.support_radius(r)).collect()
 }
 
 /// The proximity graph of a scan, with orientation, geodesic distances and coarser levels.
@@ -128,7 +128,8 @@ impl SurfaceGraph {
 
     fn with_close_pairs(self, samples: SurfaceSamples<'_>, paths: Paths) -> Self {
         let network = self.network(samples.positions);
-        let map = |network, radii: &[f32]| ClosePairs::build(network, &horizons(samples.plan, radii), paths);
+        let map =
+            |network, radii: &[f32]| ClosePairs::build(network, &support_radii(samples.plan, radii), paths);
         // Building levels uses one core only.
         let (of_points, levels) =
             both(|| map(network, samples.radii), || self.levels(samples.positions, samples.radii));
@@ -321,14 +322,14 @@ impl SurfaceGraph {
         let count = radii.len();
         let points = PointGraph::load(file, meta.points, count, check)?;
         let confidence: Array<u8> = file.array(CONFIDENCE, 0)?;
-        Flaw::length("the confidence of normals", confidence.len(), count)?;
+        Flaw::length("confidences of normals", confidence.len(), count)?;
         let parts: Array<StoredPart> = file.array(PARTS, 0)?;
         let is_sound = |part: &StoredPart| {
             let known = part.flags as usize >> 1 < DECISIONS.len();
             known && points.components().get(part.first as usize) == Some(&part.first)
         };
         if let Some(index) = parts.iter().position(|part| !is_sound(part)) {
-            return Err(Flaw::Value { what: "the side of part", index }.into());
+            return Err(Flaw::Value { what: "the orientation of part", index }.into());
         }
         if check == Check::Full {
             check_parts(&parts, points.components())?;
@@ -338,7 +339,7 @@ impl SurfaceGraph {
             let stored = Levels::load(file, count, check)?;
             let radii = std::iter::once(radii).chain(stored.cells().iter().map(|cells| cells.radii()));
             let map = |(part, radii): (u32, &[f32])| {
-                ClosePairs::load(file, part, (radii.len(), |i| plan.horizon(radii[i])), check)
+                ClosePairs::load(file, part, (radii.len(), |i| plan.support_radius(radii[i])), check)
             };
             close_pairs = (0..).zip(radii).map(map).collect::<Result<_, _>>()?;
             levels = stored.into();
@@ -369,5 +370,5 @@ fn check_parts(parts: &[StoredPart], components: &[u32]) -> Result<(), Flaw> {
         return Err(Flaw::Value { what: "part", index });
     }
     let (found, expected) = (parts.len(), expected.count());
-    if found == expected { Ok(()) } else { Err(Flaw::Length { array: "the list of parts", found, expected }) }
+    if found == expected { Ok(()) } else { Err(Flaw::Length { array: "parts", found, expected }) }
 }

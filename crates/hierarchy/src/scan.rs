@@ -1,6 +1,7 @@
 //! A prepared scan: its construction, and the queries about it alone.
 
 pub(crate) mod apart;
+pub(crate) mod arrays;
 pub(crate) mod build;
 pub(crate) mod data;
 pub(crate) mod evaluate;
@@ -15,5 +16,4 @@ pub(crate) mod points;
 pub(crate) mod prepare;
 pub(crate) mod sampling;
 pub(crate) mod share;
-pub(crate) mod slices;
 pub(crate) mod survey;

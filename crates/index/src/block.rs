@@ -13,7 +13,7 @@ pub struct PointBlock {
     /// Coordinates of the points; 1e30, too far to be a neighbour, in unused lanes.
     pub position: [[f32; WIDTH]; 3],
     /// Support radius of each point; zero in unused lanes.
-    pub horizon: [f32; WIDTH],
+    pub support_radius: [f32; WIDTH],
 }
 
 impl PointBlock {
@@ -21,7 +21,7 @@ impl PointBlock {
     pub const WIDTH: usize = WIDTH;
 
     /// A block without points.
-    pub const EMPTY: Self = Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH] };
+    pub const EMPTY: Self = Self { position: [[1e30; Self::WIDTH]; 3], support_radius: [0.0; Self::WIDTH] };
 
     /// Returns the position of point `i` of `blocks`.
     ///
@@ -51,7 +51,7 @@ impl PointBlock {
 
     /// Returns the blocks of all points of a scan, with support radius zero.
     #[must_use]
-    pub fn silent(positions: &[[f32; 3]]) -> impl ExactSizeIterator<Item = Self> {
+    pub fn without_support(positions: &[[f32; 3]]) -> impl ExactSizeIterator<Item = Self> {
         positions.chunks(Self::WIDTH).map(Self::of)
     }
 }
@@ -62,7 +62,7 @@ impl PointBlock {
     /// number; the rest of `lanes` is unspecified. No branch depends on the outcome, which would be
     /// unpredictable.
     #[inline(always)]
-    pub fn heard<S: Simd>(
+    pub fn supporting<S: Simd>(
         &self,
         simd: S,
         x: [f32; 3],
@@ -76,14 +76,14 @@ impl PointBlock {
             f32x16::load_array_ref(simd, py) - x[1],
             f32x16::load_array_ref(simd, pz) - x[2],
         );
-        let far = f32x16::load_array_ref(simd, &self.horizon) + distance;
-        let heard: mask32x16<S> = (dx * dx + dy * dy + dz * dz).simd_lt(far * far);
+        let far = f32x16::load_array_ref(simd, &self.support_radius) + distance;
+        let supporting: mask32x16<S> = (dx * dx + dy * dy + dz * dz).simd_lt(far * far);
         if let Level::Avx512(_) = simd.level() {
             let ids = u32x16::load_array_ref(simd, &LANES) + first;
-            simd.compress_u32x16(ids, heard).store_slice(&mut lanes[..]);
-            return heard.to_bitmask().count_ones() as usize;
+            simd.compress_u32x16(ids, supporting).store_slice(&mut lanes[..]);
+            return supporting.to_bitmask().count_ones() as usize;
         }
-        let [low, high, ..] = heard.to_bitmask().to_le_bytes();
+        let [low, high, ..] = supporting.to_bitmask().to_le_bytes();
         let count = low.count_ones() as usize;
         for i in 0..8 {
             lanes[i] = first + u32::from(BITS[usize::from(low)][i]);

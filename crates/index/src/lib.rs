@@ -6,4 +6,4 @@ mod tree;
 
 pub use block::PointBlock;
 pub use fearless_simd::Level;
-pub use tree::{BlockBoxes, BlockGrid, BlockTree, Cones, Heard, Nearest, Neighbour, Skeleton};
+pub use tree::{BlockBoxes, BlockGrid, BlockTree, Cones, Nearest, Neighbour, Overlaps, Skeleton};

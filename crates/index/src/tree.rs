@@ -13,16 +13,16 @@
 
 mod cells;
 mod cones;
-mod heard;
 mod near;
 mod nearest;
+mod overlaps;
 mod skeleton;
 mod walk;
 
 pub use cells::BlockGrid;
 pub use cones::Cones;
-pub use heard::Heard;
 pub use nearest::{Nearest, Neighbour};
+pub use overlaps::Overlaps;
 pub use skeleton::Skeleton;
 
 use std::convert::Infallible;
@@ -45,7 +45,7 @@ const MOST_LEVELS: usize = 8;
 struct Boxes {
     min: [[f32; WIDTH]; 3],
     max: [[f32; WIDTH]; 3],
-    horizon: [f32; WIDTH],
+    support_radius: [f32; WIDTH],
 }
 
 impl Boxes {
@@ -53,7 +53,7 @@ impl Boxes {
     const EMPTY: Self = Self {
         min: [[f32::INFINITY; WIDTH]; 3],
         max: [[f32::NEG_INFINITY; WIDTH]; 3],
-        horizon: [0.0; WIDTH],
+        support_radius: [0.0; WIDTH],
     };
 
     /// Returns the boxes of a group. `count` is the number of boxes of the level.
@@ -70,7 +70,7 @@ impl Boxes {
             self.min[k][lane] = bounds.min[k];
             self.max[k][lane] = bounds.max[k];
         }
-        self.horizon[lane] = bounds.horizon;
+        self.support_radius[lane] = bounds.support_radius;
     }
 
     #[inline(always)]
@@ -78,7 +78,7 @@ impl Boxes {
         Bounds {
             min: [self.min[0][lane], self.min[1][lane], self.min[2][lane]],
             max: [self.max[0][lane], self.max[1][lane], self.max[2][lane]],
-            horizon: self.horizon[lane],
+            support_radius: self.support_radius[lane],
         }
     }
 
@@ -100,26 +100,30 @@ impl Boxes {
 struct Bounds {
     min: [f32; 3],
     max: [f32; 3],
-    horizon: f32,
+    support_radius: f32,
 }
 
 impl Bounds {
     /// Returns the box of the first `count` points of a block.
     fn of_block(block: &PointBlock, count: usize) -> Self {
         let of = |k: usize| &block.position[k][..count];
-        Self::of(of, of, &block.horizon[..count])
+        Self::of(of, of, &block.support_radius[..count])
     }
 
     /// Returns the box of all boxes of a group.
     fn of_group(group: &Boxes) -> Self {
-        Self::of(|k| &group.min[k], |k| &group.max[k], &group.horizon)
+        Self::of(|k| &group.min[k], |k| &group.max[k], &group.support_radius)
     }
 
-    fn of<'a>(min: impl Fn(usize) -> &'a [f32], max: impl Fn(usize) -> &'a [f32], horizons: &[f32]) -> Self {
+    fn of<'a>(
+        min: impl Fn(usize) -> &'a [f32],
+        max: impl Fn(usize) -> &'a [f32],
+        support_radii: &[f32],
+    ) -> Self {
         Self {
             min: [0, 1, 2].map(|k| min(k).iter().copied().fold(f32::INFINITY, f32::min)),
             max: [0, 1, 2].map(|k| max(k).iter().copied().fold(f32::NEG_INFINITY, f32::max)),
-            horizon: horizons.iter().copied().fold(0.0, f32::max),
+            support_radius: support_radii.iter().copied().fold(0.0, f32::max),
         }
     }
 
@@ -176,8 +180,8 @@ impl BlockBoxes {
         points: usize,
         room: impl Fn(usize) -> Result<Room<Boxes>, E>,
     ) -> Result<Self, E> {
-        assert_eq!(blocks.len(), points.div_ceil(WIDTH), "{points} points fill other blocks");
-        assert!(points < u32::MAX as usize, "{points} points have no ids");
+        assert_eq!(blocks.len(), points.div_ceil(WIDTH), "expected the blocks of {points} points");
+        assert!(points < u32::MAX as usize, "expected fewer than 2^32 - 1 points, got {points}");
         let mut level = room(blocks.len().div_ceil(WIDTH))?;
         fill(&mut level, |group| {
             let of = |block: usize| Bounds::of_block(&blocks[block], (points - block * WIDTH).min(WIDTH));
@@ -200,7 +204,12 @@ impl BlockBoxes {
     #[inline]
     #[must_use]
     pub fn over<'a>(&'a self, blocks: &'a [PointBlock]) -> BlockTree<'a> {
-        assert_eq!(blocks.len(), self.points.div_ceil(WIDTH), "{} points fill other blocks", self.points);
+        assert_eq!(
+            blocks.len(),
+            self.points.div_ceil(WIDTH),
+            "expected the blocks of {} points",
+            self.points
+        );
         BlockTree { blocks, points: self.points, levels: &self.levels }
     }
 
@@ -218,7 +227,7 @@ impl BlockBoxes {
 }
 
 /// A tree of boxes over blocks of points, from [`BlockBoxes::over`]. See [`Self::nearest`] and
-/// [`Self::heard`].
+/// [`Self::overlapping`].
 #[derive(Debug, Clone, Copy)]
 pub struct BlockTree<'a> {
     blocks: &'a [PointBlock],

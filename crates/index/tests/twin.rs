@@ -1,7 +1,7 @@
 //! Queries of blocks compared with brute force over all points in the same arithmetic.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use nearmiss_index::{BlockBoxes, Heard, Nearest, PointBlock};
+use nearmiss_index::{BlockBoxes, Nearest, Overlaps, PointBlock};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 use nearmiss_testdata::instructions::levels;
 
@@ -18,13 +18,13 @@ fn points(kind: CloudKind, n: u32, seed: u64, scale: f64) -> Vec<Point> {
     points
 }
 
-fn blocks(points: &[Point], horizon: impl Fn(usize) -> f32) -> Vec<PointBlock> {
+fn blocks(points: &[Point], support_radius: impl Fn(usize) -> f32) -> Vec<PointBlock> {
     let mut blocks = vec![PointBlock::EMPTY; points.len().div_ceil(16)];
     for (i, p) in points.iter().enumerate() {
         for k in 0..3 {
             blocks[i / 16].position[k][i % 16] = p[k];
         }
-        blocks[i / 16].horizon[i % 16] = horizon(i);
+        blocks[i / 16].support_radius[i % 16] = support_radius(i);
     }
     blocks
 }
@@ -89,18 +89,18 @@ fn neither_size_nor_an_order_without_places_changes_an_answer() {
     compare_nearest(&close, &[1, 5, 40], "distances that underflow");
 }
 
-fn compare_heard(points: &[Point], horizon: impl Fn(usize) -> f32, what: &str) {
-    let blocks = blocks(points, &horizon);
+fn compare_overlaps(points: &[Point], support_radius: impl Fn(usize) -> f32, what: &str) {
+    let blocks = blocks(points, &support_radius);
     let boxes = BlockBoxes::new(&blocks, points.len());
     let tree = boxes.over(&blocks);
-    let mut found = Heard::default();
+    let mut found = Overlaps::default();
     for level in levels() {
         for block in 0..blocks.len() {
-            tree.heard(level, block, &mut found);
+            tree.overlapping(level, block, &mut found);
             for lane in 0..16.min(points.len() - block * 16) {
                 let i = block * 16 + lane;
                 let near = |j: usize| {
-                    let far = horizon(i) + horizon(j);
+                    let far = support_radius(i) + support_radius(j);
                     distance_sq(points[i], points[j]) < far * far
                 };
                 let all: Vec<u32> =
@@ -115,22 +115,22 @@ fn compare_heard(points: &[Point], horizon: impl Fn(usize) -> f32, what: &str) {
 }
 
 #[test]
-fn what_is_heard_is_what_a_look_at_all_points_hears() {
+fn overlapping_points_are_those_of_an_exhaustive_search() {
     for kind in CloudKind::ALL {
         for n in [1, 17, 700] {
             let points = points(kind, n, 7, 1.0);
             let radius = |i: usize| naive_nearest(&points, i, 3).last().map_or(0.0, |n| n.0.sqrt());
-            let horizons: Vec<f32> = (0..points.len()).map(radius).collect();
-            compare_heard(&points, |i| horizons[i], &format!("{kind:?}, {n}"));
+            let support_radii: Vec<f32> = (0..points.len()).map(radius).collect();
+            compare_overlaps(&points, |i| support_radii[i], &format!("{kind:?}, {n}"));
         }
     }
     let points = points(CloudKind::Sphere, 500, 8, 1.0);
-    compare_heard(
+    compare_overlaps(
         &points,
         |i| if i.is_multiple_of(97) { 3.0 } else { 0.01 },
-        "a few that are heard everywhere",
+        "a few whose balls overlap all others",
     );
-    compare_heard(&points, |_| 0.0, "nobody");
+    compare_overlaps(&points, |_| 0.0, "nobody");
 }
 
 fn compare_cones(points: &[Point], tips: &[f32], own: &[f32], slope: f32, what: &str) {

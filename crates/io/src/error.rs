@@ -316,8 +316,8 @@ pub enum Fault {
     },
     /// Compressed data that would take very much memory for their length.
     #[error(
-        "expected compressed points of a scan, got {} from {}, far more than a scan gives; if that is right, save \
-         the file with `DATA binary`",
+        "expected the compressed points of a scan, got {} from {}, an implausible ratio; if it is right, save the \
+         file with `DATA binary`",
         counted(points, "point", "points"),
         bytes(packed)
     )]

@@ -61,22 +61,26 @@ impl SampleOptions {
 #[non_exhaustive]
 pub enum SampleError {
     /// A spacing that is not positive and finite.
-    #[error("a spacing of {spacing} is none; give a length above 0")]
+    #[error("expected a finite spacing above 0, got {spacing}")]
     Spacing {
         /// The spacing given.
         spacing: f64,
     },
     /// A vertex with a NaN or infinite coordinate.
-    #[error("vertex {vertex} has a coordinate that is not finite; repair the mesh")]
+    #[error(
+        "expected finite coordinates, got NaN or infinity (vertex {vertex}); correct or remove the vertex"
+    )]
     NotFinite {
         /// Index of the vertex.
         vertex: usize,
     },
     /// A number of samples requested of a mesh without area.
-    #[error("the mesh has no area to spread points over; sample it at a spacing")]
+    #[error(
+        "expected a mesh with an area above 0, got an area of 0; give a spacing instead of a number of samples"
+    )]
     NoArea,
     /// More samples than 32-bit ids can number.
-    #[error("about {count:e} samples would be needed, more than 2^32; give a larger spacing")]
+    #[error("expected at most 2^32 samples, got about {count:e}; give a larger spacing")]
     TooMany {
         /// Approximate number of samples.
         count: f64,

@@ -195,9 +195,9 @@ impl Scan {
         let plan = *hierarchy.plan();
         let samples = SurfaceSamples { plan: &plan, positions: &positions, radii: &radii };
         let kernel = graph.kernel(samples).ok_or(GraphError::NoClosePairs)?;
-        hierarchy.use_metric(Metric::Geodesic, |i, scratch: &mut KernelScratch, heard| {
+        hierarchy.use_metric(Metric::Geodesic, |i, scratch: &mut KernelScratch, supporting| {
             let (at, near) = kernel.evaluate_at(i, scratch);
-            heard.extend(near.iter().map(|close| close.point));
+            supporting.extend(near.iter().map(|close| close.point));
             at
         });
         Ok(Self { density, ..Self::of(hierarchy, Some(graph)) })

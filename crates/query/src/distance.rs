@@ -20,7 +20,7 @@ use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
 use crate::leaf::nearest_points::PointPair;
 use crate::pair::meter::Meter;
 use crate::pair::placed::{Placed, ViewScratch};
-use crate::pair::scan_pair::{ScanPair, motion_of, relative};
+use crate::pair::scan_pair::{ScanPair, relative, relative_pose_of};
 use approach::{Approach, Feet};
 use search::Search;
 pub(crate) use search::{Frontier, Nearness};
@@ -157,16 +157,16 @@ pub(crate) fn distance(
         };
     };
     let (level, meter) = (contact.level, Meter::new(budget, views, 0));
-    let motion = motion_of(views, &pose);
-    let slices = views.map(|view| view.scan().slices());
+    let relative_pose = relative_pose_of(views, &pose);
+    let arrays = views.map(|view| view.scan().arrays());
     let semantics = plan.options.semantics;
-    let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, semantics.part()));
+    let pair = ScanPair::new(views, arrays.each_ref(), relative, meter, (level, semantics.part()));
     if let Semantics::Thickened(radius) = semantics {
-        return Apart { plan, budget, search: Search::new(pair, &motion, false) }.balls(radius, open);
+        return Apart { plan, budget, search: Search::new(pair, &relative_pose, false) }.balls(radius, open);
     }
     // Enclosures prove nothing about geodesic surfaces.
     let is_bounded = plan.options.metric != Some(Metric::Geodesic);
-    Apart { plan, budget, search: Search::new(pair, &motion, is_bounded) }.surfaces(open, contact)
+    Apart { plan, budget, search: Search::new(pair, &relative_pose, is_bounded) }.surfaces(open, contact)
 }
 
 /// Distance, in bands, beyond which the feet on the surfaces of obstacles are at most 1 % nearer to
@@ -299,7 +299,9 @@ impl Apart<'_> {
     fn samples(&self) -> Distance {
         let PointPair { distance, points } = self.search.best;
         let views = self.search.pair.views;
-        let half = |k: usize| 0.5 * f64::from(views[k].scan().radii()[points[k]]) * views[k].placed().scale();
+        let half = |k: usize| {
+            0.5 * f64::from(views[k].scan().radii()[points[k]]) * views[k].stored_to_world().scale()
+        };
         let of_obstacles = self.of_obstacles();
         let places = [0, 1].map(|k| views[k].point(points[k]));
         Distance {

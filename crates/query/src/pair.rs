@@ -3,9 +3,9 @@
 pub(crate) mod bounds;
 pub(crate) mod likelihood;
 pub(crate) mod meter;
-pub(crate) mod motion;
 pub(crate) mod placed;
 pub(crate) mod placed_balls;
 pub(crate) mod prepared;
+pub(crate) mod relative_pose;
 pub(crate) mod scan_pair;
 pub(crate) mod shape_index;

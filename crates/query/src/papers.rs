@@ -65,7 +65,7 @@ pub(crate) fn collide(
         Method::Interpolation(_) => u64::from(a.leaf_size()),
     };
     let looked_at = match order {
-        Order::Sides | Order::SidesByGap => a.slices().samples(0).len() as u64,
+        Order::Sides | Order::SidesByGap => a.arrays().samples(0).len() as u64,
         Order::DepthFirst | Order::Overlap => 0,
     };
     let evaluations = 2 * test_points + NODE_PAIRS_A_LEAF_PAIR * looked_at;

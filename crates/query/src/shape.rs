@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Aabb, PointId, Pose};
-use nearmiss_hierarchy::{PlaceVisitor, Slices};
+use nearmiss_hierarchy::{PlaceVisitor, ScanArrays};
 use nearmiss_index::Skeleton;
 
 use crate::pair::placed::Placed;
@@ -109,7 +109,7 @@ impl Placed<'_> {
     #[must_use]
     pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
         let (skeleton, radius) = self.stored(shape);
-        let scale = self.placed().scale();
+        let scale = self.stored_to_world().scale();
         let reach = radius + reach / scale;
         if !(radius >= 0.0 && reach >= 0.0) {
             return None;
@@ -185,9 +185,9 @@ impl Placed<'_> {
         let far = middle.amax() + f64::from(Vector3::from(bounds.centre).amax() + bounds.radius());
         // Too far away, single precision cannot tell the boxes apart: all of them are searched.
         let (place, radius) = if far > FARTHEST { ([0.0; 3], f64::INFINITY) } else { (centre, radius) };
-        let slices = self.scan().slices();
+        let arrays = self.scan().arrays();
         let mut search = Search {
-            slices: &slices,
+            arrays: &arrays,
             skeleton,
             any,
             // Rounding error of the distance of a box in single precision.
@@ -199,7 +199,7 @@ impl Placed<'_> {
         #[expect(clippy::cast_possible_truncation, reason = "counted in `beyond`")]
         let place = place.map(|c| c as f32);
         // An early end means only that a point was found.
-        let _ended = slices.tree.descend_to(Level::new(), place, &mut search);
+        let _ended = arrays.tree.descend_to(Level::new(), place, &mut search);
         let (distance_sq, i) = search.best;
         (i != usize::MAX).then_some((i, distance_sq))
     }
@@ -208,7 +208,7 @@ impl Placed<'_> {
     /// negative for a box with a negative or NaN edge.
     #[inline]
     fn stored(&self, shape: &Shape) -> (Skeleton, f64) {
-        let placed = self.placed();
+        let placed = self.stored_to_world();
         match *shape {
             Shape::Sphere { centre, radius } => {
                 (Skeleton::Point(placed.apply_inverse(centre)), radius / placed.scale())
@@ -247,7 +247,7 @@ fn near<'a>(index: &'a ShapeIndex, skeleton: &Skeleton, radius: f64) -> Option<&
 
 /// The search for the point nearest to a skeleton, which visits the boxes near a ball about it.
 struct Search<'a> {
-    slices: &'a Slices<'a>,
+    arrays: &'a ScanArrays<'a>,
     skeleton: &'a Skeleton,
     /// `true` if any point within reach will do.
     any: bool,
@@ -274,8 +274,8 @@ impl PlaceVisitor for Search<'_> {
     }
 
     fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
-        for i in self.slices.leaves.points(number) {
-            let own = (self.skeleton.distance_sq(self.slices.position(i).map(f64::from)), i);
+        for i in self.arrays.leaves.points(number) {
+            let own = (self.skeleton.distance_sq(self.arrays.position(i).map(f64::from)), i);
             if own < self.best {
                 self.best = own;
                 self.limit();

@@ -61,7 +61,7 @@ impl About {
 
 /// A required slice is not loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("slice {slice} is needed and not loaded")]
+#[error("expected slice {slice} to be loaded, got a map without it; load it first")]
 pub struct Unloaded {
     /// The slice, counted from the lowest.
     pub slice: u32,

@@ -121,7 +121,7 @@ impl SliceMap {
     /// # Panics
     /// If there are not as many answers as boxes.
     pub fn query_each(&self, boxes: &[Aabb], floor: Floor, answers: &mut [Result<Occupancy, Unloaded>]) {
-        assert_eq!(boxes.len(), answers.len(), "an answer a box");
+        assert_eq!(boxes.len(), answers.len(), "expected an answer for each box");
         change_each(answers, CHUNK, |i, answer| *answer = self.query(&boxes[i], floor));
     }
 

@@ -44,7 +44,7 @@ impl fmt::Display for Misplaced {
         f.write_str(match self {
             Self::OffMap => "is outside the map",
             Self::Obstacle => "is inside an obstacle",
-            Self::LowCeiling => "is too low under a ceiling, or inside something level",
+            Self::LowCeiling => "is under a ceiling that is too low, or inside a level object",
             Self::Airborne => "is in the air",
         })
     }

@@ -104,14 +104,14 @@ pub enum StoreError {
 }
 
 /// Describes an error in a file of a map. The container errors suggest remedies for scans; remedies
-/// with a word of `unfit` are replaced.
-fn of_map(cause: &OpenError, unfit: &[&str]) -> String {
+/// with a word of `unsuitable` are replaced.
+fn of_map(cause: &OpenError, unsuitable: &[&str]) -> String {
     let what = match &cause.fault {
         ContainerFault::NotAContainer { .. } => {
             "expected a file of a slice map, got another format".to_owned()
         }
         fault => match fault.to_string().rsplit_once("; ") {
-            Some((what, remedy)) if unfit.iter().any(|word| remedy.contains(word)) => what.to_owned(),
+            Some((what, remedy)) if unsuitable.iter().any(|word| remedy.contains(word)) => what.to_owned(),
             _ => return cause.to_string(),
         },
     };

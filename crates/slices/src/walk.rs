@@ -353,6 +353,9 @@ pub fn step_each(
     response: &dyn Response,
     steps: &mut [Result<Step, Unloaded>],
 ) {
-    assert!(walkers.len() == targets.len() && walkers.len() == steps.len(), "a target and a step a walker");
+    assert!(
+        walkers.len() == targets.len() && walkers.len() == steps.len(),
+        "expected a target and a step for each walker"
+    );
     change_both(walkers, steps, CHUNK, |i, walker, step| *step = walker.step(map, targets[i], response));
 }

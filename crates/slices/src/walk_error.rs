@@ -52,7 +52,7 @@ pub enum WalkError {
     },
     /// The start is blocked.
     #[error(
-        "expected a free start, got {place:?}, inside an obstacle or too low under a ceiling; start elsewhere, or with a \
+        "expected a free start, got {place:?}, inside an obstacle or under a ceiling that is too low; start elsewhere, or with a \
          smaller avatar"
     )]
     Blocked {

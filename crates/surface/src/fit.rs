@@ -119,13 +119,13 @@ impl Moments {
         }
     }
 
-    /// Returns the covariance times the square of the weight, over the square of Σw·horizon. The
+    /// Returns the covariance times the square of the weight, over the square of Σw·R. The
     /// solver needs this scale, and no division depends on another.
     #[inline(always)]
     fn scaled_covariance(&self) -> [f64; 6] {
         let [wx, wy, wz] = self.first;
         let [xx, xy, xz, yy, yz, zz] = self.second.map(|s| s * self.weight);
-        let per_square = 1.0 / (self.horizon * self.horizon);
+        let per_square = 1.0 / (self.support_radius * self.support_radius);
         let covariance = [xx - wx * wx, xy - wx * wy, xz - wx * wz, yy - wy * wy, yz - wy * wz, zz - wz * wz];
         covariance.map(|c| c * per_square)
     }
@@ -149,11 +149,11 @@ impl Moments {
         }
         let per_weight = 1.0 / m.weight;
         let mean = m.first.map(|s| s * per_weight);
-        let horizon = m.horizon * per_weight;
-        let eigenvalues = thrice.map(|l| l * (horizon * horizon * (1.0 / 3.0)));
+        let support_radius = m.support_radius * per_weight;
+        let eigenvalues = thrice.map(|l| l * (support_radius * support_radius * (1.0 / 3.0)));
         let normal = with_positive_largest(least);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
-        let bandwidth = horizon * f64::from(plan.per_horizon());
+        let bandwidth = support_radius * f64::from(plan.per_support_radius());
         // Invalid points, as from a damaged file, yield invalid sums.
         if !(f.is_finite() && bandwidth.is_finite()) {
             return nothing;

@@ -175,10 +175,10 @@ mod tests {
     }
 
     #[test]
-    fn wendland_ends_at_its_horizon() {
+    fn wendland_ends_at_its_support_radius() {
         #[expect(clippy::cast_possible_truncation, reason = "the kernel is single precision")]
         let end = Kernel::Wendland.reach_sq(0.1) as f32;
-        assert!(Kernel::Wendland.weight(end) < 1e-20, "zero at the horizon");
+        assert!(Kernel::Wendland.weight(end) < 1e-20, "zero at the support radius");
         assert!(Kernel::Wendland.weight(2.0 * end) < 1e-20, "and beyond");
         assert_eq!(Kernel::Wendland.weight(0.0).to_bits(), 1.0_f32.to_bits(), "one at the point");
     }

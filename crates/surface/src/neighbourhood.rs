@@ -19,8 +19,8 @@ pub struct Moments {
     pub(crate) first: [f64; 3],
     /// Σw(p−x)(p−x)ᵀ as xx xy xz yy yz zz.
     pub(crate) second: [f64; 6],
-    /// Σw·horizon.
-    pub(crate) horizon: f64,
+    /// Σw·R.
+    pub(crate) support_radius: f64,
     /// The least d²/h².
     pub(crate) nearest: f32,
     /// Number of points.
@@ -150,7 +150,7 @@ pub struct Neighbourhood<'a, S: Simd> {
     weight: f32x8<S>,
     first: [f32x8<S>; 3],
     second: [f32x8<S>; 6],
-    horizon: f32x8<S>,
+    support_radius: f32x8<S>,
     nearest: f32x8<S>,
     support: u32,
 }
@@ -168,7 +168,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
             weight: zero,
             first: [zero; 3],
             second: [zero; 6],
-            horizon: zero,
+            support_radius: zero,
             nearest: f32x8::simd_from(simd, f32::INFINITY),
             support: 0,
         }
@@ -184,7 +184,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         self.add(simd, block, 1, high);
     }
 
-    /// Adds the blocks with indices `heard`, ascending, as [`Self::offer`] does. `halves` is
+    /// Adds the blocks with indices `supporting`, ascending, as [`Self::offer`] does. `halves` is
     /// scratch memory; its contents afterwards are unspecified.
     ///
     /// Computes first the distances for all blocks, then the weights, then the sums. This avoids an
@@ -192,13 +192,19 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// other half does not. It also keeps dependency chains short enough for out-of-order
     /// execution, and the constants of the kernel and the sums do not compete for registers.
     #[inline(always)]
-    pub fn offer_all(&mut self, simd: S, blocks: &[PointBlock], heard: &[u32], halves: &mut Vec<HalfBlock>) {
-        let most = 2 * heard.len() + 1;
+    pub fn offer_all(
+        &mut self,
+        simd: S,
+        blocks: &[PointBlock],
+        supporting: &[u32],
+        halves: &mut Vec<HalfBlock>,
+    ) {
+        let most = 2 * supporting.len() + 1;
         if halves.len() < most {
             halves.resize(most, HalfBlock::default());
         }
         let (halves, mut count) = (&mut halves[..most], 0);
-        for &id in heard {
+        for &id in supporting {
             if let (Some(block), Some([one, other, ..])) =
                 (blocks.get(id as usize), halves.get_mut(count..).and_then(<[_]>::first_chunk_mut::<2>))
             {
@@ -241,8 +247,8 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// Returns 1/h² of the points of a block; infinite in unused lanes.
     #[inline(always)]
     fn decay(&self, simd: S, block: &PointBlock) -> f32x16<S> {
-        let horizon = f32x16::load_array_ref(simd, &block.horizon);
-        f32x16::splat(simd, self.plan.reach_sq()) / (horizon * horizon)
+        let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
+        f32x16::splat(simd, self.plan.reach_sq()) / (support_radius * support_radius)
     }
 
     /// Returns d²/h² of the points of a block, and for each half whether any point contributes.
@@ -292,7 +298,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         self.second[3] += wy * y;
         self.second[4] += wy * z;
         self.second[5] += wz * z;
-        self.horizon += w * load(&block.horizon);
+        self.support_radius += w * load(&block.support_radius);
     }
 
     /// Returns the sums over all lanes.
@@ -303,12 +309,12 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let [xx, xy, xz, yy, yz, zz] = self.second;
         let [weight, x, y, z] = totals(simd, [self.weight, x, y, z]);
         let [xx, xy, xz, yy] = totals(simd, [xx, xy, xz, yy]);
-        let [yz, zz, horizon, _] = totals(simd, [yz, zz, self.horizon, self.horizon]);
+        let [yz, zz, support_radius, _] = totals(simd, [yz, zz, self.support_radius, self.support_radius]);
         let (low, high) = simd.split_f32x8(self.nearest);
         let [a, b, c, d] = low.min(high).to_array();
         let nearest = a.min(b).min(c.min(d));
         let (first, second) = ([x, y, z], [xx, xy, xz, yy, yz, zz]);
-        Moments { weight, first, second, horizon, nearest, support: self.support }
+        Moments { weight, first, second, support_radius, nearest, support: self.support }
     }
 }
 

@@ -61,7 +61,7 @@ pub struct SurfaceOptions {
     /// m, the support radius in sampling radii (Klein & Zachmann 2004, eq. 9): 1 to 16, default 3.
     /// A larger value smooths noise, rounds edges and merges close sheets. The cost grows with its
     /// square.
-    pub horizon: f64,
+    pub support_radius: f64,
     /// θ_ε, the weight at the support radius: 1e-12 to 0.5, default 1e-4. A smaller value narrows
     /// the kernel within the same support radius. Only the Gaussian uses it.
     pub threshold: f64,
@@ -75,7 +75,7 @@ impl Default for SurfaceOptions {
         Self {
             kernel: Kernel::Gaussian,
             bandwidth: Bandwidth::Local,
-            horizon: 3.0,
+            support_radius: 3.0,
             threshold: 1e-4,
             support_min: 6,
         }
@@ -97,8 +97,8 @@ impl SurfaceOptions {
 
     /// Sets the support radius, in sampling radii.
     #[must_use]
-    pub const fn with_horizon(self, horizon: f64) -> Self {
-        Self { horizon, ..self }
+    pub const fn with_support_radius(self, support_radius: f64) -> Self {
+        Self { support_radius, ..self }
     }
 
     /// Sets the weight at the support radius.
@@ -122,17 +122,17 @@ const REPRESENTABLE: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
 #[non_exhaustive]
 pub enum SurfaceError {
     /// A support radius that is not between 1 and 16 sampling radii.
-    #[error("a horizon of {0} sampling radii; it must lie between 1 and 16")]
-    Horizon(f64),
+    #[error("expected a support radius of 1 to 16 sampling radii, got {0}")]
+    SupportRadius(f64),
     /// A weight at the support radius that is not between 1e-12 and 0.5.
-    #[error("a weight of {0} at the horizon; it must lie between 1e-12 and 0.5")]
+    #[error("expected a weight of 1e-12 to 0.5 at the support radius, got {0}")]
     Threshold(f64),
     /// A least support below 3, the number of points that span a plane.
-    #[error("a least support of {0}; three points are needed to span a plane")]
+    #[error("expected a minimum support of at least 3 points, got {0}")]
     Support(u32),
     /// A fixed bandwidth that is not positive, or whose square is out of the range of single
     /// precision.
-    #[error("a bandwidth of {0}; it must be positive, and neither vanish nor be boundless beside the scan")]
+    #[error("expected a positive bandwidth comparable to the extent of the scan, got {0}")]
     Bandwidth(f64),
 }
 
@@ -140,40 +140,42 @@ pub enum SurfaceError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePlan {
     options: SurfaceOptions,
-    /// `horizon_i = slope · r_i + level`; one of the two is zero.
+    /// `R_i = slope · r_i + level`; one of the two is zero.
     slope: f32,
     level: f32,
     reach_sq: f32,
     /// h over the support radius.
-    per_horizon: f32,
+    per_support_radius: f32,
 }
 
 impl SurfacePlan {
     /// Returns blocks of all points of a scan, given their positions and local sampling radii.
     #[must_use]
     pub fn blocks(&self, positions: &[[f32; 3]], radii: &[f32]) -> impl ExactSizeIterator<Item = PointBlock> {
-        PointBlock::silent(positions).zip(radii.chunks(PointBlock::WIDTH)).map(|(mut block, radii)| {
-            self.tune(&mut block, radii);
-            block
-        })
+        PointBlock::without_support(positions).zip(radii.chunks(PointBlock::WIDTH)).map(
+            |(mut block, radii)| {
+                self.tune(&mut block, radii);
+                block
+            },
+        )
     }
 
-    /// Sets the point in a lane of a block; `horizon` is its support radius.
+    /// Sets the point in a lane of a block; `support_radius` is its support radius.
     ///
     /// # Panics
     /// Panics if there is no such lane.
     #[inline]
-    pub fn put(&self, block: &mut PointBlock, lane: usize, position: [f32; 3], horizon: f32) {
+    pub fn put(&self, block: &mut PointBlock, lane: usize, position: [f32; 3], support_radius: f32) {
         for k in 0..3 {
             block.position[k][lane] = position[k];
         }
-        block.horizon[lane] = horizon;
+        block.support_radius[lane] = support_radius;
     }
 
     /// Sets the support radii of the first points of a block from their local sampling radii.
     pub fn tune(&self, block: &mut PointBlock, radii: &[f32]) {
-        for (horizon, radius) in block.horizon.iter_mut().zip(radii) {
-            *horizon = self.horizon(*radius);
+        for (support_radius, radius) in block.support_radius.iter_mut().zip(radii) {
+            *support_radius = self.support_radius(*radius);
         }
     }
 
@@ -186,9 +188,9 @@ impl SurfacePlan {
     /// # Errors
     /// Fails if an option is out of range; the error names it.
     pub fn new(options: &SurfaceOptions, sampling_radius: f64, unit: f64) -> Result<Self, SurfaceError> {
-        let SurfaceOptions { bandwidth, horizon, threshold, support_min, .. } = *options;
-        if !(1.0..=16.0).contains(&horizon) {
-            return Err(SurfaceError::Horizon(horizon));
+        let SurfaceOptions { bandwidth, support_radius, threshold, support_min, .. } = *options;
+        if !(1.0..=16.0).contains(&support_radius) {
+            return Err(SurfaceError::SupportRadius(support_radius));
         }
         if !(1e-12..=0.5).contains(&threshold) {
             return Err(SurfaceError::Threshold(threshold));
@@ -198,8 +200,8 @@ impl SurfacePlan {
         }
         let reach_sq = options.kernel.reach_sq(threshold);
         let (slope, level) = match bandwidth {
-            Bandwidth::Local => (horizon, 0.0),
-            Bandwidth::Global => (0.0, horizon * sampling_radius),
+            Bandwidth::Local => (support_radius, 0.0),
+            Bandwidth::Global => (0.0, support_radius * sampling_radius),
             Bandwidth::Fixed(h) if REPRESENTABLE.contains(&(h * unit)) => (0.0, h * unit * reach_sq.sqrt()),
             Bandwidth::Fixed(h) => return Err(SurfaceError::Bandwidth(h)),
         };
@@ -209,7 +211,7 @@ impl SurfacePlan {
             slope: slope as f32,
             level: level as f32,
             reach_sq: reach_sq as f32,
-            per_horizon: (1.0 / reach_sq.sqrt()) as f32,
+            per_support_radius: (1.0 / reach_sq.sqrt()) as f32,
         };
         Ok(plan)
     }
@@ -229,7 +231,7 @@ impl SurfacePlan {
     /// Returns the support radius of a point with local sampling radius `radius`.
     #[inline(always)]
     #[must_use]
-    pub fn horizon(&self, radius: f32) -> f32 {
+    pub fn support_radius(&self, radius: f32) -> f32 {
         self.slope * radius + self.level
     }
 
@@ -237,20 +239,20 @@ impl SurfacePlan {
     #[inline]
     #[must_use]
     pub fn bandwidth(&self, radius: f32) -> f32 {
-        self.horizon(radius) * self.per_horizon
+        self.support_radius(radius) * self.per_support_radius
     }
 
-    /// Returns 1/h² of a point with support radius `horizon`.
+    /// Returns 1/h² of a point with this support radius.
     #[inline(always)]
     #[must_use]
-    pub fn decay(&self, horizon: f32) -> f32 {
-        self.reach_sq / (horizon * horizon)
+    pub fn decay(&self, support_radius: f32) -> f32 {
+        self.reach_sq / (support_radius * support_radius)
     }
 
     /// Returns h over the support radius.
     #[inline]
-    pub(crate) fn per_horizon(&self) -> f32 {
-        self.per_horizon
+    pub(crate) fn per_support_radius(&self) -> f32 {
+        self.per_support_radius
     }
 
     /// Returns (support radius/h)², the value of d²/h² at which weights end.
@@ -269,8 +271,8 @@ mod tests {
     fn ranges_are_checked_by_name() {
         let bad = |o: SurfaceOptions| SurfacePlan::new(&o, 1.0, 1.0).unwrap_err();
         let d = SurfaceOptions::default;
-        assert_eq!(bad(d().with_horizon(0.5)), SurfaceError::Horizon(0.5));
-        assert!(matches!(bad(d().with_horizon(f64::NAN)), SurfaceError::Horizon(_)));
+        assert_eq!(bad(d().with_support_radius(0.5)), SurfaceError::SupportRadius(0.5));
+        assert!(matches!(bad(d().with_support_radius(f64::NAN)), SurfaceError::SupportRadius(_)));
         assert_eq!(bad(d().with_threshold(0.0)), SurfaceError::Threshold(0.0));
         assert_eq!(bad(d().with_support_min(2)), SurfaceError::Support(2));
         for h in [-1.0, 0.0, 1e-300, 1e300, f64::INFINITY] {

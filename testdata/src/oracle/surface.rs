@@ -35,29 +35,29 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// Returns h_i of a point with the support radius `horizon`, m times its spacing.
+    /// Returns h_i of a point with support radius `support_radius`, m times its spacing.
     ///
     /// h²/2 is the variance along an axis of the kernel's weights on an evenly sampled plane. That
-    /// is the definition of h for Wendland's kernel. With R = `horizon` and w = (1 − q)⁴(4q + 1),
+    /// is the definition of h for Wendland's kernel. With R = `support_radius` and w = (1 − q)⁴(4q + 1),
     /// h²/2 = R²/2 · ∫q³w dq / ∫q w dq = R²/2 · (5/504)/(1/14) = R²·5/72.
     #[must_use]
-    pub fn bandwidth(&self, horizon: f64) -> f64 {
+    pub fn bandwidth(&self, support_radius: f64) -> f64 {
         match self {
-            Self::Gaussian { theta } => horizon / (-theta.ln()).sqrt(),
-            Self::Wendland => horizon * (5.0_f64 / 36.0).sqrt(),
+            Self::Gaussian { theta } => support_radius / (-theta.ln()).sqrt(),
+            Self::Wendland => support_radius * (5.0_f64 / 36.0).sqrt(),
         }
     }
 
-    /// Returns the weight at distance `d` of a point with the support radius `horizon`.
+    /// Returns the weight at distance `d` of a point with support radius `support_radius`.
     #[must_use]
-    pub fn weight(&self, d: f64, horizon: f64) -> f64 {
-        if d >= horizon {
+    pub fn weight(&self, d: f64, support_radius: f64) -> f64 {
+        if d >= support_radius {
             return 0.0;
         }
         match self {
-            Self::Gaussian { .. } => (-(d / self.bandwidth(horizon)).powi(2)).exp(),
+            Self::Gaussian { .. } => (-(d / self.bandwidth(support_radius)).powi(2)).exp(),
             Self::Wendland => {
-                let q = d / horizon;
+                let q = d / support_radius;
                 (1.0 - q).powi(4) * (4.0 * q + 1.0)
             }
         }
@@ -166,8 +166,10 @@ impl SurfaceTwin {
         let x = Vector3::from(x);
         let reaching: Vec<(Vector3<f64>, f64, f64)> = (self.points.iter().zip(&self.radii))
             .map(|(&p, &r)| (Vector3::from(p), reach * r))
-            .filter(|(p, horizon)| (p - x).norm() < *horizon)
-            .map(|(p, horizon)| (p, kernel.weight((p - x).norm(), horizon), kernel.bandwidth(horizon)))
+            .filter(|(p, support_radius)| (p - x).norm() < *support_radius)
+            .map(|(p, support_radius)| {
+                (p, kernel.weight((p - x).norm(), support_radius), kernel.bandwidth(support_radius))
+            })
             .collect();
         let total: f64 = reaching.iter().map(|(_, w, _)| w).sum();
         if total <= 0.0 {
@@ -329,9 +331,9 @@ mod tests {
             },
         );
         assert!(twin.radii().iter().all(|r| *r == twin.radii()[0]), "one for all");
-        let horizon = 3.0 * twin.radii()[0];
-        assert_eq!(twin.evaluate([0.0, 0.0, horizon]), None, "the horizon is open");
-        let rim = twin.evaluate([0.0, 0.0, 0.999 * horizon]).unwrap();
+        let support_radius = 3.0 * twin.radii()[0];
+        assert_eq!(twin.evaluate([0.0, 0.0, support_radius]), None, "the support ball is open");
+        let rim = twin.evaluate([0.0, 0.0, 0.999 * support_radius]).unwrap();
         assert!(rim.support < 6 && rim.status == Status::Outside, "{rim:?}");
         assert_eq!(twin.points().len(), points.len());
     }

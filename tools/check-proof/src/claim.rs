@@ -89,7 +89,9 @@ impl Checker<'_> {
 
     /// Checks that both placements are poses, and those of the query.
     fn placements(&self, line: &Line, finding: &mut Finding) -> Result<[Placement; 2], String> {
-        let asked = self.poses.map(|poses| poses.get(&line.query).ok_or("no such line among the poses"));
+        let asked = self.poses.map(|poses| {
+            poses.get(&line.query).ok_or("expected the line of a pose as query, got another number")
+        });
         let asked: Option<&[Matrix; 2]> = asked.transpose()?;
         let mut place = |i: usize, name: &str, matrix: &Matrix| {
             let placement = Placement::new(matrix).map_err(|e| format!("{name}: {e}"))?;
@@ -100,7 +102,9 @@ impl Checker<'_> {
                 let moved = placement.moved(&poses[i], scan.frame(), *bounds) / radius;
                 finding.mended = finding.mended.max(moved);
                 if moved.is_nan() || moved > MENDED {
-                    return Err(format!("{name} is {moved:.2e} sampling radii away from the pose asked for"));
+                    return Err(format!(
+                        "{name}: expected the pose of the query, got one {moved:.2e} sampling radii away"
+                    ));
                 }
             }
             Ok(placement)
@@ -116,7 +120,10 @@ impl Checker<'_> {
         placements: &[Placement; 2],
         finding: &mut Finding,
     ) -> Result<(), String> {
-        let gap = line.gap.filter(|gap| *gap >= 0.0).ok_or("certified apart without a gap")?;
+        let gap = line
+            .gap
+            .filter(|gap| *gap >= 0.0)
+            .ok_or("expected a gap of at least 0 with a certified separation, got none")?;
         for (name, nodes, subject) in
             [("a", &line.nodes_a, self.subjects[0]), ("b", &line.nodes_b, self.subjects[1])]
         {
@@ -127,7 +134,7 @@ impl Checker<'_> {
         }
         let known = |[i, j]: [usize; 2]| i < line.nodes_a.len() && j < line.nodes_b.len();
         if let Some(pair) = line.pairs.iter().find(|pair| !known(**pair)) {
-            return Err(format!("the pair {pair:?} is of nodes that are not listed"));
+            return Err(format!("expected pairs of listed nodes, got {pair:?}"));
         }
 
         let points = |node: &Enclosure| u64::from(node.first)..u64::from(node.first) + u64::from(node.count);
@@ -137,7 +144,9 @@ impl Checker<'_> {
         let size = self.subjects.map(|subject| subject.scan.len() as u64);
         if let Some([i, j]) = uncovered(&rectangles, size) {
             let count = line.pairs.len();
-            return Err(format!("none of {count} pairs has point {i} of a with point {j} of b"));
+            return Err(format!(
+                "expected a node pair with point {i} of a and point {j} of b, got none among {count}"
+            ));
         }
 
         let place = |nodes: &[Enclosure], matrix: &Matrix| -> Vec<Placed> {
@@ -152,7 +161,9 @@ impl Checker<'_> {
             });
             let Some(proven) = proven else {
                 let [a, b] = [&line.nodes_a[i], &line.nodes_b[j]].map(points);
-                return Err(format!("the enclosures of {a:?} of a and {b:?} of b are not {wanted} apart"));
+                return Err(format!(
+                    "expected nodes at least {wanted} apart, got nearer ones (points {a:?} of a and {b:?} of b)"
+                ));
             };
             finding.pairs += 1;
             finding.claimed = finding.claimed.max(wanted / proven);
@@ -199,8 +210,11 @@ impl Checker<'_> {
         placements: &[Placement; 2],
         finding: &mut Finding,
     ) -> Result<(), String> {
-        let witness = line.witness.ok_or("certified to intersect without a witness")?;
-        let claimed = line.residual.filter(|r| *r >= 0.0).ok_or("a witness without a residual")?;
+        let witness = line.witness.ok_or("expected a witness with a certified contact, got none")?;
+        let claimed = line
+            .residual
+            .filter(|r| *r >= 0.0)
+            .ok_or("expected a residual of at least 0 with a witness, got none")?;
         if line.semantics == Semantics::Obstacle {
             return self.obstacles_meet(line, placements, witness, finding);
         }
@@ -218,9 +232,10 @@ impl Checker<'_> {
                 finding.between = true;
                 let ((a, from_a), (b, from_b)) = (near(0, "a")?, near(1, "b")?);
                 if from_a + from_b > line.margin * (1.0 + ROUNDING) {
-                    let far = format!("{from_a:.4e} and {from_b:.4e} from the witness");
                     return Err(format!(
-                        "points of the surfaces were found {far}, together more than the margin"
+                        "expected surface points within the margin, {}, of each other, got points {from_a:.4e} and {from_b:.4e} \
+                         from the witness",
+                        line.margin
                     ));
                 }
                 (a, b)
@@ -230,7 +245,7 @@ impl Checker<'_> {
         finding.on_the_brink = a.on_the_brink || b.on_the_brink;
         let residual = a.residual.max(b.residual);
         if !finding.between && (residual - claimed).abs() > RESIDUAL * a.bandwidth.max(b.bandwidth) {
-            return Err(format!("the residual is {residual:.2e}, not {claimed:.2e}"));
+            return Err(format!("expected the residual {residual:.2e}, got {claimed:.2e}"));
         }
         Ok(())
     }
@@ -245,7 +260,10 @@ impl Checker<'_> {
         x: [f64; 3],
         finding: &mut Finding,
     ) -> Result<(), String> {
-        let claimed = line.residual.filter(|r| *r >= 0.0).ok_or("a witness without a residual")?;
+        let claimed = line
+            .residual
+            .filter(|r| *r >= 0.0)
+            .ok_or("expected a residual of at least 0 with a witness, got none")?;
         let mut on_surfaces = Vec::new();
         let away = [0, 1].map(|i| {
             let (subject, placement) = (self.subjects[i], &placements[i]);
@@ -271,15 +289,15 @@ impl Checker<'_> {
         };
         if away[0] + away[1] > line.margin * (1.0 + ROUNDING) + ROUNDING * radius(0).max(radius(1)) {
             return Err(format!(
-                "the witness is {:.4e} and {:.4e} from the obstacles, together more than the margin",
-                away[0], away[1]
+                "expected a witness whose distances from the obstacles sum to at most the margin, {}, got {:.4e} and {:.4e}",
+                line.margin, away[0], away[1]
             ));
         }
         if let [a, b] = on_surfaces[..] {
             // For balls the residual is half the distance of the points.
             let residual = a.residual.max(b.residual);
             if (residual - claimed).abs() > RESIDUAL * a.bandwidth.max(b.bandwidth) {
-                return Err(format!("the residual is {residual:.2e}, not {claimed:.2e}"));
+                return Err(format!("expected the residual {residual:.2e}, got {claimed:.2e}"));
             }
         }
         Ok(())

@@ -87,9 +87,9 @@ fn run(args: &Args) -> Outcome {
     rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global()?;
     let faults = check(args)?;
     if faults > 0 {
-        return Err(format!("{faults} violations").into());
+        return Err(format!("expected a valid proof, got {faults} violations").into());
     }
-    println!("everything holds");
+    println!("every certified answer is proven");
     Ok(())
 }
 
@@ -169,7 +169,7 @@ impl Tally {
             }
         }
         if tally.lines == 0 {
-            return Err(format!("{}: no lines", path.display()).into());
+            return Err(format!("{}: expected the lines of a proof, got none", path.display()).into());
         }
         Ok(tally)
     }
@@ -178,7 +178,7 @@ impl Tally {
     fn count(&mut self, query: u64, finding: Finding) -> Vec<String> {
         let mut faults = finding.faults;
         if !self.queries.insert(query) {
-            faults.push(format!("query {query} is answered twice"));
+            faults.push(format!("expected one answer to query {query}, got two"));
         }
         self.separated += usize::from(finding.kind == Kind::Separated);
         self.intersecting += usize::from(finding.kind == Kind::Intersecting);
@@ -198,17 +198,19 @@ impl Tally {
         let unproven = lines - separated - intersecting;
         println!("{lines} answers, {unproven} of them not certified");
         println!(
-            "{separated} certified apart, by {pairs} pairs of nodes, {by_points} of them by their points; a gap claims at most {:.4} % of what is proven",
+            "{separated} certified separations, proven by {pairs} node pairs, {by_points} of them by their points; a claimed gap is at \
+             most {:.4} % of the proven one",
             100.0 * claimed
         );
         println!(
-            "{intersecting} certified to intersect, {between} of them by points of either surface within the margin; \
-             a point is at most {off:.1e} bandwidths off; {on_the_brink} within rounding of a condition"
+            "{intersecting} certified contacts, {between} of them by two surface points within the margin; points are at most \
+             {off:.1e} bandwidths off the surface; {on_the_brink} meet a condition only up to rounding"
         );
         if let Some(poses) = poses {
             let unanswered = poses.keys().filter(|query| !self.queries.contains(query)).count();
             println!(
-                "{} poses, {unanswered} without an answer; of certified ones mended by at most {mended:.1e} sampling radii",
+                "{} poses, {unanswered} without an answer; the poses of certified answers were corrected by at most {mended:.1e} \
+                 sampling radii",
                 poses.len()
             );
         }
@@ -218,8 +220,9 @@ impl Tally {
 fn print_sampled(path: &Path, sampled: &Sampled) {
     let Sampled { starts, points, places, in_cells, fill, far, .. } = sampled;
     println!(
-        "{}: {points} surface points from {starts} starts, {places} of them of status ok themselves, {in_cells} of all in cells; at most {:.2} % out \
-         to a face of an enclosure and {far:.3} local radii from the nearest point",
+        "{}: {points} surface points from {starts} starts, and {places} starts with status ok; {in_cells} of them are in \
+         the cell of a point; they reach at most {:.2} % of the half extent of an enclosure, and are at most {far:.3} local \
+         radii from the nearest point",
         path.display(),
         100.0 * fill
     );

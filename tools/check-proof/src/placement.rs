@@ -20,7 +20,7 @@ impl Placement {
     /// If `matrix` is not a rotation with one scale and a shift.
     pub(crate) fn new(matrix: &Matrix) -> Result<Self, String> {
         if matrix[12..] != [0.0, 0.0, 0.0, 1.0] {
-            return Err("the last row is not 0 0 0 1".into());
+            return Err("expected a last row of 0 0 0 1, got another one".into());
         }
         let column = |j: usize| [matrix[j], matrix[4 + j], matrix[8 + j]];
         let product = |i: usize, j: usize| (0..3).map(|k| column(i)[k] * column(j)[k]).sum::<f64>();
@@ -28,13 +28,16 @@ impl Placement {
         let off = |(i, j): (usize, usize)| (product(i, j) - if i == j { square } else { 0.0 }).abs();
         let worst = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(off).into_iter().fold(0.0, f64::max);
         if !square.is_normal() || worst > ROUNDING * square {
-            return Err(format!("no turn with one scale: off by {:.1e}", worst / square));
+            return Err(format!(
+                "expected a rotation with uniform scale, got one that is off by {:.1e}",
+                worst / square
+            ));
         }
         let [x, y, z] = [column(0), column(1), column(2)];
         let determinant = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
             + x[2] * (y[0] * z[1] - y[1] * z[0]);
         if determinant <= 0.0 {
-            return Err("it mirrors".into());
+            return Err("expected a rotation, got a reflection".into());
         }
         Ok(Self { matrix: *matrix, scale: square.sqrt() })
     }

@@ -86,7 +86,7 @@ impl Line {
         let finite = scalars.chain(vectors.copied()).all(f64::is_finite);
         let boxes = || line.nodes_a.iter().chain(&line.nodes_b);
         if !finite || !boxes().all(Enclosure::is_finite) {
-            return Err("a number is not finite".into());
+            return Err("expected finite numbers, got another".into());
         }
         Ok(line)
     }

@@ -24,7 +24,7 @@ pub(crate) struct Subject {
     pub(crate) scan: Scan,
     pub(crate) twin: SurfaceTwin,
     /// Support radius of a point, per unit of the twin's radii.
-    pub(crate) horizon: f64,
+    pub(crate) support_radius: f64,
     /// Ids of the nodes by their points.
     ids: BTreeMap<(usize, usize), usize>,
     /// Bounds of the stored positions.
@@ -59,8 +59,8 @@ impl Subject {
                 bounds[1][k] = bounds[1][k].max(p[k]);
             }
         }
-        let (twin, horizon) = twin(&scan)?;
-        Ok(Self { scan, twin, horizon, ids, bounds })
+        let (twin, support_radius) = twin(&scan)?;
+        Ok(Self { scan, twin, support_radius, ids, bounds })
     }
 
     /// Returns the radius of the obstacle's ball about point `i`; zero if the point samples a
@@ -77,9 +77,9 @@ impl Subject {
     /// nearest point it is. It is the radius of its ball, or of its cell, or of its disc with a
     /// thickness of a twentieth of the radius.
     pub(crate) fn reach(&self, i: usize) -> f64 {
-        let slices = self.scan.slices();
+        let arrays = self.scan.arrays();
         if self.is_on_sheet(i) {
-            self.cell(i).max(1.05 * f64::from(slices.discs.get(i)))
+            self.cell(i).max(1.05 * f64::from(arrays.discs.get(i)))
         } else {
             self.ball(i)
         }
@@ -107,9 +107,9 @@ impl Subject {
     /// Returns `true` if `x` in the stored frame is in the cell of point `i`, up to rounding,
     /// assuming that `i` is its nearest point.
     pub(crate) fn is_in_cell_of(&self, i: usize, x: [f64; 3]) -> bool {
-        let slices = self.scan.slices();
-        let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.position(i)[k]));
-        let height: f64 = (0..3).map(|k| d[k] * f64::from(slices.normals[i][k])).sum();
+        let arrays = self.scan.arrays();
+        let d = [0, 1, 2].map(|k| x[k] - f64::from(arrays.position(i)[k]));
+        let height: f64 = (0..3).map(|k| d[k] * f64::from(arrays.normals[i][k])).sum();
         let distance = d.iter().map(|x| x * x).sum::<f64>().sqrt();
         self.is_on_sheet(i)
             && height.abs() <= rounded(SLAB * self.radius(i))
@@ -117,7 +117,7 @@ impl Subject {
     }
 
     fn is_on_sheet(&self, i: usize) -> bool {
-        i < self.scan.slices().dense && matches!(self.scan.kind(i), PointKind::Sheet | PointKind::Edge)
+        i < self.scan.arrays().dense && matches!(self.scan.kind(i), PointKind::Sheet | PointKind::Edge)
     }
 
     fn radius(&self, i: usize) -> f64 {
@@ -125,7 +125,7 @@ impl Subject {
     }
 
     fn cell(&self, i: usize) -> f64 {
-        self.radius(i).min(0.5 * f64::from(self.scan.slices().reach))
+        self.radius(i).min(0.5 * f64::from(self.scan.arrays().reach))
     }
 
     /// # Errors
@@ -133,13 +133,13 @@ impl Subject {
     pub(crate) fn check_node(&self, claimed: &Enclosure, semantics: Semantics) -> Result<(), String> {
         let Enclosure { first, count, .. } = *claimed;
         let Some(&id) = self.ids.get(&(first as usize, count as usize)) else {
-            return Err(format!("no node has the points {first} to {first} + {count}"));
+            return Err(format!("expected the points of a node, got {count} from {first}"));
         };
-        let slices = self.scan.slices();
+        let arrays = self.scan.arrays();
         let stored = if semantics == Semantics::Obstacle {
-            slices.obstacle_enclosure(id)
+            arrays.obstacle_enclosure(id)
         } else {
-            slices.enclosure(id)
+            arrays.enclosure(id)
         };
         let bits = |[a, b, c]: [f32; 3]| [a.to_bits(), b.to_bits(), c.to_bits()];
         let same = bits(stored.centre) == bits(claimed.centre)
@@ -148,7 +148,9 @@ impl Subject {
         if same {
             Ok(())
         } else {
-            Err(format!("node {id} ({first} to {first} + {count}) has another enclosure"))
+            Err(format!(
+                "expected the stored enclosure of node {id} ({count} points from {first}), got another"
+            ))
         }
     }
 }
@@ -162,26 +164,30 @@ fn rounded(x: f64) -> f64 {
 /// Then the nodes that contain a point are its leaf and that leaf's ancestors.
 fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
     if nodes.first().map(|root| &root.points) != Some(&(0..points)) {
-        return Err("the root has not all points".into());
+        return Err("expected a root with all points, got another".into());
     }
     let mut parents = vec![0_u32; nodes.len()];
     for (id, node) in nodes.iter().enumerate().filter(|(_, node)| !node.children.is_empty()) {
         let mut next = node.points.start;
         for &child in &node.children {
             let Some(own) = nodes.get(child).map(|child| &child.points) else {
-                return Err(format!("node {id} has no children there"));
+                return Err(format!("expected children of node {id} within the tree, got {child}"));
             };
             if own.start != next || own.is_empty() {
-                return Err(format!("node {id} has not the points of its children"));
+                return Err(format!("expected node {id} to have the points of its children, got others"));
             }
             next = own.end;
             parents[child] += 1;
         }
         if next != node.points.end {
-            return Err(format!("node {id} has not the points of its children"));
+            return Err(format!("expected node {id} to have the points of its children, got others"));
         }
     }
-    if parents.iter().skip(1).any(|n| *n != 1) { Err("a node has not one parent".into()) } else { Ok(()) }
+    if parents.iter().skip(1).any(|n| *n != 1) {
+        Err("expected one parent for each node, got another number".into())
+    } else {
+        Ok(())
+    }
 }
 
 /// A node as this checker uses it.
@@ -208,15 +214,15 @@ fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
     let kernel = match options.kernel {
         Kernel::Gaussian => oracle::Kernel::Gaussian { theta: options.threshold },
         Kernel::Wendland => oracle::Kernel::Wendland,
-        other => return Err(format!("there is no naive twin of the kernel {other:?}")),
+        other => return Err(format!("expected the kernel Gaussian or Wendland, got {other:?}")),
     };
     let unit = scan.frame().scale;
     let (reach, radii) = match options.bandwidth {
-        Bandwidth::Local => (options.horizon, scan.radii().iter().map(|r| f64::from(*r)).collect()),
-        Bandwidth::Global => (options.horizon, vec![scan.sampling_radius() / unit; scan.len()]),
+        Bandwidth::Local => (options.support_radius, scan.radii().iter().map(|r| f64::from(*r)).collect()),
+        Bandwidth::Global => (options.support_radius, vec![scan.sampling_radius() / unit; scan.len()]),
         // The support radius for which the bandwidth is the given one.
         Bandwidth::Fixed(h) => (1.0 / kernel.bandwidth(1.0), vec![h / unit; scan.len()]),
-        other => return Err(format!("there is no naive twin of the bandwidth {other:?}")),
+        other => return Err(format!("expected the bandwidth Local, Global or Fixed, got {other:?}")),
     };
     let points: Vec<[f64; 3]> = scan.positions().iter().map(|p| p.map(f64::from)).collect();
     let least_support = options.support_min as usize;

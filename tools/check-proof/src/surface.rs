@@ -88,9 +88,9 @@ impl<'a> Tree<'a> {
         let scan = &subject.scan;
         let inverse = |b: OrientedBox| Inverse::new(b.centre, b.half, b.axes);
         let boxes = scan.enclosures().map(inverse).collect();
-        let slices = scan.slices();
+        let arrays = scan.arrays();
         let topology = scan.topology();
-        let of_obstacle = topology.ids().map(|id| inverse(slices.obstacle_enclosure(id.index()))).collect();
+        let of_obstacle = topology.ids().map(|id| inverse(arrays.obstacle_enclosure(id.index()))).collect();
         let mut parents = vec![0; topology.len()];
         let mut leaves = vec![0; scan.len()];
         for id in topology.ids() {
@@ -109,10 +109,10 @@ impl<'a> Tree<'a> {
         let point = nearest.index as usize;
         let radius = f64::from(self.subject.scan.radii()[point]);
         sampled.far = sampled.far.max(nearest.distance_sq.sqrt() / radius);
-        self.check_enclosed(&self.boxes, x, point, "the place", sampled);
+        self.check_enclosed(&self.boxes, x, point, "a place with status ok", sampled);
         if self.subject.is_in_cell_of(point, x) {
             sampled.in_cells += 1;
-            self.check_enclosed(&self.of_obstacle, x, point, "the place of the obstacle", sampled);
+            self.check_enclosed(&self.of_obstacle, x, point, "a place of the obstacle", sampled);
         }
     }
 
@@ -122,7 +122,7 @@ impl<'a> Tree<'a> {
         let p = self.subject.scan.positions()[point].map(f64::from);
         let radius = self.subject.ball(point);
         let x = [0, 1, 2].map(|k| p[k] + radius * away[k]);
-        self.check_enclosed(&self.of_obstacle, x, point, "the place of the ball", sampled);
+        self.check_enclosed(&self.of_obstacle, x, point, "a point of a ball", sampled);
     }
 
     /// Checks that `x`, which belongs to `point`, is in the enclosures of all nodes above.
@@ -140,8 +140,8 @@ impl<'a> Tree<'a> {
             sampled.fill = sampled.fill.max(fill);
             if fill.is_nan() || fill > 1.0 {
                 sampled.faults.push(format!(
-                    "{what} {x:?} (stored frame), nearest to point {point}, is outside the enclosure of node {id}: \
-                     {fill} of its half extent"
+                    "expected {what} within the enclosure of node {id}, got {x:?} (stored frame, nearest to point {point}) \
+                     at {fill} times its half extent"
                 ));
             }
             if id == 0 {
@@ -200,7 +200,7 @@ pub(crate) fn check(subject: &Subject, points: u64, seed: u64, done: &AtomicU64)
     for (point, p) in subject.scan.positions().iter().enumerate() {
         let p = p.map(f64::from);
         for boxes in [&tree.boxes, &tree.of_obstacle] {
-            tree.check_enclosed(boxes, p, point, "the cloud point", &mut all);
+            tree.check_enclosed(boxes, p, point, "a measured point", &mut all);
         }
     }
     for chunk in chunks {
@@ -213,7 +213,7 @@ pub(crate) fn check(subject: &Subject, points: u64, seed: u64, done: &AtomicU64)
         all.faults.extend(chunk.faults);
     }
     if all.points == 0 && points > 0 {
-        all.faults.push("no point of the surface was found, so nothing was seen of the enclosures".into());
+        all.faults.push("expected surface points to check the enclosures with, got none".into());
     }
     all
 }

@@ -106,7 +106,7 @@ fn any_pair_that_is_missing_is_missed() {
     for i in 0..line.pairs.len() {
         let mut line = line.clone();
         line.pairs.remove(i);
-        assert!(trial.fault(&line).contains("pairs has point"), "pair {i}");
+        assert!(trial.fault(&line).contains("expected a node pair with point"), "pair {i}");
     }
 }
 
@@ -118,10 +118,12 @@ fn enclosures_are_the_scans_own() {
         change(&mut line.nodes_b[1]);
         trial.fault(&line)
     };
-    assert!(tampered(&|node| node.half[2] = node.half[2].next_down()).contains("another enclosure"));
-    assert!(tampered(&|node| node.centre[0] = -node.centre[0]).contains("another enclosure"));
-    assert!(tampered(&|node| node.axes[1][2] += 1e-6).contains("another enclosure"));
-    assert!(tampered(&|node| node.count += 1).contains("no node has the points"));
+    assert!(
+        tampered(&|node| node.half[2] = node.half[2].next_down()).contains("expected the stored enclosure")
+    );
+    assert!(tampered(&|node| node.centre[0] = -node.centre[0]).contains("expected the stored enclosure"));
+    assert!(tampered(&|node| node.axes[1][2] += 1e-6).contains("expected the stored enclosure"));
+    assert!(tampered(&|node| node.count += 1).contains("expected the points of a node"));
 }
 
 #[test]
@@ -132,15 +134,15 @@ fn gaps_and_margins_are_not_taken_on_trust() {
         let gap = line.gap.unwrap();
         assert!(trial.checker().check(&with(0.0, 0.9 * gap)).faults.is_empty(), "less is proven too");
         // The bound is no worse than that.
-        assert!(trial.fault(&with(gap + 0.3, 0.0)).contains("apart"), "line {}", line.query);
-        assert!(trial.fault(&with(0.0, gap + 0.3)).contains("apart"), "line {}", line.query);
-        assert!(trial.fault(&Line { gap: None, ..line.clone() }).contains("without a gap"));
+        assert!(trial.fault(&with(gap + 0.3, 0.0)).contains("apart, got nearer"), "line {}", line.query);
+        assert!(trial.fault(&with(0.0, gap + 0.3)).contains("apart, got nearer"), "line {}", line.query);
+        assert!(trial.fault(&Line { gap: None, ..line.clone() }).contains("expected a gap"));
     }
     let mut crossed = trial.separation();
     crossed.placed_b[7] -= 0.1;
     let checker = Checker { poses: None, ..trial.checker() };
-    assert!(checker.check(&crossed).faults[0].contains("apart"), "moved into each other");
-    assert!(trial.fault(&crossed).contains("away from the pose"), "and moved at all");
+    assert!(checker.check(&crossed).faults[0].contains("apart, got nearer"), "moved into each other");
+    assert!(trial.fault(&crossed).contains("sampling radii away"), "and moved at all");
 }
 
 /// Near contact, the points of leaves prove what their enclosures do not. That holds for obstacles
@@ -160,7 +162,7 @@ fn points_part_obstacles_only() {
         let of_surfaces = Line { semantics: Semantics::Surface, ..line.clone() };
         assert!(!trial.fault(&of_surfaces).is_empty(), "line {}", line.query);
         let further = Line { gap: line.gap.map(|gap| gap + 0.01), ..line.clone() };
-        assert!(trial.fault(&further).contains("are not"), "line {}", line.query);
+        assert!(trial.fault(&further).contains("apart, got nearer"), "line {}", line.query);
     }
     assert!(by_points > 0, "no pair was parted by points");
 }
@@ -170,9 +172,9 @@ fn placements_are_the_poses_asked_for() {
     let trial = trial();
     let mut sheared = trial.separation();
     sheared.placed_a[1] += 1e-9;
-    assert!(trial.fault(&sheared).contains("no turn"));
+    assert!(trial.fault(&sheared).contains("expected a rotation with uniform scale"));
     let unknown = Line { query: 99, ..trial.separation() };
-    assert!(trial.fault(&unknown).contains("no such line"));
+    assert!(trial.fault(&unknown).contains("expected the line of a pose"));
 }
 
 #[test]
@@ -180,15 +182,15 @@ fn witnesses_lie_on_both_surfaces() {
     let trial = trial();
     let line = trial.certified(Verdict::Intersecting).next().unwrap();
     let r = trial.subject.scan.sampling_radius();
-    for (by, fault) in [(1e-3 * r, "from the obstacles"), (50.0 * r, "")] {
+    for (by, fault) in [(1e-3 * r, "distances from the obstacles"), (50.0 * r, "")] {
         // Along the diagonal, in no plane of either surface.
         let mut moved = line.clone();
         moved.witness = line.witness.map(|x| x.map(|c| c + by));
         assert!(trial.fault(&moved).contains(fault), "moved by {by}");
     }
     let residual = Line { residual: Some(0.01 * r), ..line.clone() };
-    assert!(trial.fault(&residual).contains("the residual is"));
-    assert!(trial.fault(&Line { witness: None, ..line.clone() }).contains("without a witness"));
+    assert!(trial.fault(&residual).contains("expected the residual"));
+    assert!(trial.fault(&Line { witness: None, ..line.clone() }).contains("expected a witness with"));
 }
 
 #[test]
@@ -207,10 +209,10 @@ fn witnesses_between_surfaces_are_within_the_margin() {
     let line = between.last().unwrap();
     let mut moved = (*line).clone();
     moved.witness = line.witness.map(|[x, y, z]| [x, y + 5.0 * margin, z]);
-    assert!(trial.fault(&moved).contains("more than the margin"));
+    assert!(trial.fault(&moved).contains("the margin, "));
     let narrow = Line { margin: 0.1 * line.residual.unwrap(), ..(*line).clone() };
-    assert!(trial.fault(&narrow).contains("more than the margin"));
-    assert!(trial.fault(&Line { margin: 0.0, ..(*line).clone() }).contains("from the obstacles"));
+    assert!(trial.fault(&narrow).contains("the margin, "));
+    assert!(trial.fault(&Line { margin: 0.0, ..(*line).clone() }).contains("distances from the obstacles"));
 }
 
 #[test]

@@ -41,14 +41,16 @@ pub(crate) fn check(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Re
 
 /// Does the same as [`check`], for a point among the stored positions.
 fn check_stored(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result<Seen, String> {
-    let Some(at) = subject.twin.evaluate(x) else { return Err("no point reaches the witness".into()) };
+    let Some(at) = subject.twin.evaluate(x) else {
+        return Err("expected a witness within the support of the points, got one without support".into());
+    };
     let off = at.value.abs() / at.bandwidth;
     if off.is_nan() || off > ON_SURFACE {
-        return Err(format!("the witness is {off:.2e} bandwidths off the surface"));
+        return Err(format!("expected a witness on the surface, got one {off:.2e} bandwidths off"));
     }
     let on_the_brink = at.status != Status::Ok;
     if on_the_brink && !is_nearly_ok(subject, x, &at) {
-        return Err(format!("the surface is {:?} at the witness", at.status));
+        return Err(format!("expected status Ok at the witness, got {:?}", at.status));
     }
     let (residual, bandwidth) = (at.value.abs() * placement.scale, at.bandwidth * placement.scale);
     Ok(Seen { off, residual, bandwidth, on_the_brink })
@@ -86,7 +88,7 @@ pub(crate) fn check_near(
     feet.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let seen =
         feet.into_iter().find_map(|(away, foot)| Some((check_stored(subject, placement, foot).ok()?, away)));
-    seen.ok_or_else(|| "no point of the surface was found near the witness".into())
+    seen.ok_or_else(|| "expected a surface point near the witness, got none".into())
 }
 
 /// Returns the distance of `x` of the world from the nearest ball of the obstacle. Points on sheets
@@ -129,7 +131,7 @@ fn is_nearly_ok(subject: &Subject, x: [f64; 3], at: &Evaluation) -> bool {
     let options = subject.scan.plan().options();
     let (mut support, mut is_near) = (0, false);
     for (p, r) in subject.twin.points().iter().zip(subject.twin.radii()) {
-        let (d, reach) = (distance(p, &x), subject.horizon * r * (1.0 + DISTANCE));
+        let (d, reach) = (distance(p, &x), subject.support_radius * r * (1.0 + DISTANCE));
         support += u32::from(d < reach);
         is_near |= d <= 0.5 * reach;
     }

@@ -89,14 +89,14 @@ pub(crate) fn count(clean: &PointHierarchy, rough: &PointHierarchy, pairs: u64, 
 
 /// Returns two places near the `i`-th point, and its normal.
 fn places(scan: &PointHierarchy, i: usize, rng: &mut impl rand::Rng) -> ([Vector3<f64>; 2], Vector3<f64>) {
-    let (slices, plan) = (scan.slices(), scan.plan());
-    let up = Vector3::from(slices.normals[i].map(f64::from));
-    let (r, h) = (f64::from(slices.radii[i]), f64::from(plan.bandwidth(slices.radii[i])));
+    let (arrays, plan) = (scan.arrays(), scan.plan());
+    let up = Vector3::from(arrays.normals[i].map(f64::from));
+    let (r, h) = (f64::from(arrays.radii[i]), f64::from(plan.bandwidth(arrays.radii[i])));
     let direction = Vector3::from(unit_vector(rng));
     let along = (direction - up * up.dot(&direction)).try_normalize(1e-9).unwrap_or_default();
     // The root spreads the places evenly over the disc.
     let (out, height) = (rng.random_range(0.0_f64..1.0).sqrt() * r, rng.random_range(-h..h));
-    let x = Vector3::from(slices.position(i).map(f64::from)) + along * out + up * height;
+    let x = Vector3::from(arrays.position(i).map(f64::from)) + along * out + up * height;
     ([x, x + Vector3::from(unit_vector(rng)) * (STEP * h)], up)
 }
 
@@ -161,7 +161,7 @@ mod tests {
         assert!(tally.rates()[1] > 1000.0, "about a(x), midway: {tally:?}");
         assert_eq!(tally.trusted_flips[1], 0, "the midst is ambiguous: {tally:?}");
         let far = scan(nearmiss_testdata::shapes::plates(1.5, 1.5, 4.0 * gap), 0.0);
-        assert_eq!(count(&far, &far, 40_000, 1).flips[1], 0, "8 h apart they do not hear each other");
+        assert_eq!(count(&far, &far, 40_000, 1).flips[1], 0, "8 h apart, neither supports f at the other");
     }
 
     #[test]

@@ -45,16 +45,16 @@ impl Place {
     /// Returns the place `x` of a scan. `None` if too few points support x, so that f is undefined
     /// (eq. 6).
     pub(crate) fn new(scan: &PointHierarchy, x: Vector3<f64>) -> Option<Self> {
-        let (plan, slices) = (scan.plan(), scan.slices());
+        let (plan, arrays) = (scan.plan(), scan.arrays());
         let [mut weight, mut bandwidth, mut support] = [0.0, 0.0, 0.0];
         let (mut first, mut second) = (Vector3::zeros(), [0.0; 6]);
         #[expect(clippy::cast_possible_truncation, reason = "boxes are single precision; see the slack")]
         let near = [x.x as f32, x.y as f32, x.z as f32];
-        let (tree, mut stack) = (slices.tree, vec![NodeId::ROOT]);
+        let (tree, mut stack) = (arrays.tree, vec![NodeId::ROOT]);
         let topology = tree.topology();
         while let Some(id) = stack.pop() {
             let bounds = tree.bounds(id);
-            let reach = plan.horizon(bounds.reach) * (1.0 + 1e-4);
+            let reach = plan.support_radius(bounds.reach) * (1.0 + 1e-4);
             if bounds.distance_sq(near) > reach * reach {
                 continue;
             }
@@ -63,15 +63,15 @@ impl Place {
                 continue;
             }
             for i in topology.points(id) {
-                let d = Vector3::from(slices.position(i).map(f64::from)) - x;
-                let horizon = f64::from(plan.horizon(slices.radii[i]));
-                let share = d.norm_squared() / (horizon * horizon);
+                let d = Vector3::from(arrays.position(i).map(f64::from)) - x;
+                let support_radius = f64::from(plan.support_radius(arrays.radii[i]));
+                let share = d.norm_squared() / (support_radius * support_radius);
                 if share < 1.0 {
                     #[expect(clippy::cast_possible_truncation, reason = "the kernel is single precision")]
                     let w = f64::from(plan.kernel().weight(plan.reach_sq() * share as f32));
                     support += 1.0;
                     weight += w;
-                    bandwidth += w * f64::from(plan.bandwidth(slices.radii[i]));
+                    bandwidth += w * f64::from(plan.bandwidth(arrays.radii[i]));
                     first += w * d;
                     let products = [d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z];
                     for (sum, product) in second.iter_mut().zip(products) {

@@ -15,8 +15,8 @@ const SIXTH: f64 = std::f64::consts::SQRT_2;
 /// stored positions need no other.
 pub(crate) fn roughened(clean: &PointHierarchy, noise: f64, seed: u64) -> Outcome<Scan> {
     let rng = &mut rng(seed);
-    let slices = clean.slices();
-    let moved = clean.positions().iter().zip(slices.normals).zip(slices.radii).map(|((p, n), r)| {
+    let arrays = clean.arrays();
+    let moved = clean.positions().iter().zip(arrays.normals).zip(arrays.radii).map(|((p, n), r)| {
         let along = Vector3::from(n.map(f64::from));
         let shift = noise * f64::from(*r) / SIXTH * gaussian(rng);
         <[f64; 3]>::from(Vector3::from(p.map(f64::from)) + shift * along)

@@ -102,7 +102,7 @@ fn many_poses(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) ->
         });
         row(&format!("batch, {threads} threads"), time);
         if !whole {
-            return Err("a batch answers other than single queries".into());
+            return Err("expected the answers of single queries, got others from a batch".into());
         }
     }
     println!();

@@ -14,7 +14,7 @@ use std::hint::black_box;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::geometry::NodeId;
-use nearmiss::hierarchy::{Extent, GatherScratch, NodePair, Part, Relative, Slices, Tree, apart};
+use nearmiss::hierarchy::{Extent, GatherScratch, NodePair, Part, Relative, ScanArrays, Tree, apart};
 use nearmiss::surface::project;
 use nearmiss::{BuildOptions, Pose, Scan};
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -80,11 +80,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn bytes(scan: &Scan) {
-    let slices = scan.slices();
+    let arrays = scan.arrays();
     let all = scan.bytes_of_nodes();
     println!(
         "{:.1} bytes a node, {:.1} a point for nodes\n",
-        count(all) / count(slices.tree.topology().len()),
+        count(all) / count(arrays.tree.topology().len()),
         count(all) / count(scan.len())
     );
 }
@@ -93,22 +93,22 @@ fn bytes(scan: &Scan) {
 /// surface point outside their balls, and for each node the greatest distance of its surface points
 /// from its samples. A surface point belongs to the nodes that contain its nearest scan point.
 fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Failure> {
-    let slices = scan.slices();
+    let arrays = scan.arrays();
     let tree: ImmutableKdTree<f64, 3> = {
         let points: Vec<[f64; 3]> = scan.positions().iter().map(|p| p.map(f64::from)).collect();
         ImmutableKdTree::new_from_slice(&points).map_err(|e| format!("{e:?}"))?
     };
     let mut scratch = GatherScratch::default();
     let mut random = rng(effort.seed);
-    let mut furthest_sq = vec![0.0_f64; slices.tree.topology().len()];
+    let mut furthest_sq = vec![0.0_f64; arrays.tree.topology().len()];
     let mut found = 0;
     for i in 0.. {
         if found == effort.points || i > 4 * effort.points {
             break;
         }
         let i = i % scan.len();
-        let away = point_in(&mut random, 1.5 * f64::from(slices.radii[i]));
-        let start = [0, 1, 2].map(|k| f64::from(slices.position(i)[k]) + away[k]);
+        let away = point_in(&mut random, 1.5 * f64::from(arrays.radii[i]));
+        let start = [0, 1, 2].map(|k| f64::from(arrays.position(i)[k]) + away[k]);
         let foot = project(start, |x| scan.evaluate_with(x, &mut scratch));
         if !foot.converged {
             continue;
@@ -119,23 +119,23 @@ fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Fail
         let topology = scan.topology();
         let mut next = Some(topology.leaf_of(usize::try_from(point)?));
         while let Some(id) = next.map(NodeId::index) {
-            let far = slices.samples(id).iter().map(|i| {
-                (0..3).map(|k| (f64::from(slices.position(i)[k]) - foot.point[k]).powi(2)).sum::<f64>()
+            let far = arrays.samples(id).iter().map(|i| {
+                (0..3).map(|k| (f64::from(arrays.position(i)[k]) - foot.point[k]).powi(2)).sum::<f64>()
             });
             furthest_sq[id] = furthest_sq[id].max(far.fold(f64::INFINITY, f64::min));
             next = next.and_then(|id| topology.parent(id)).map(|(parent, _)| parent);
         }
     }
     let radii: Vec<f64> = furthest_sq.into_iter().map(f64::sqrt).collect();
-    let outside = (0..radii.len()).filter(|&id| radii[id] > f64::from(slices.covering_radius(id))).count();
+    let outside = (0..radii.len()).filter(|&id| radii[id] > f64::from(arrays.covering_radius(id))).count();
     println!("{found} surface points; {outside} of {} nodes have one outside their balls\n", radii.len());
     Ok((outside, radii))
 }
 
 /// The depth of each node.
-fn depths(slices: &Slices<'_>) -> Vec<usize> {
-    let mut depths = vec![0; slices.tree.topology().len()];
-    let topology = slices.tree.topology();
+fn depths(arrays: &ScanArrays<'_>) -> Vec<usize> {
+    let mut depths = vec![0; arrays.tree.topology().len()];
+    let topology = arrays.tree.topology();
     for id in topology.ids().take(topology.inner()) {
         for child in topology.children(id).iter() {
             depths[child.index()] = depths[id.index()] + 1;
@@ -145,9 +145,9 @@ fn depths(slices: &Slices<'_>) -> Vec<usize> {
 }
 
 fn levels(scan: &Scan, effort: Effort, projected: &[f64]) {
-    let slices = scan.slices();
+    let arrays = scan.arrays();
     let hulls = Hulls::new(scan);
-    let depths = depths(&slices);
+    let depths = depths(&arrays);
     let mut random = rng(effort.seed);
     let mut share = || 0.5 + 0.5 * point_in(&mut random, 1.0)[0];
     println!(
@@ -164,25 +164,25 @@ fn levels(scan: &Scan, effort: Effort, projected: &[f64]) {
         let mut sums = [0.0; 5];
         let (mut volumes, mut short) = (Volumes::default(), 0);
         for &id in &some {
-            let grown = hulls.grown_radius(&slices, id, &mut share);
+            let grown = hulls.grown_radius(&arrays, id, &mut share);
             let own = [
-                f64::from(slices.covering_radius(id)),
+                f64::from(arrays.covering_radius(id)),
                 grown,
-                f64::from(slices.sampling_radius_of(id)),
+                f64::from(arrays.sampling_radius_of(id)),
                 projected[id],
-                f64::from(slices.node_horizon(id)) / scan.plan().options().horizon,
+                f64::from(arrays.node_support_radius(id)) / scan.plan().options().support_radius,
             ];
             short += usize::from(grown < projected[id]);
             for (sum, x) in sums.iter_mut().zip(own) {
                 *sum += x;
             }
-            let v = hulls.volumes(&slices, id, effort.draws, &mut share);
+            let v = hulls.volumes(&arrays, id, effort.draws, &mut share);
             volumes.balls += v.balls;
             volumes.hulls += v.hulls;
             volumes.enclosures += v.enclosures;
         }
         let [certified, grown, stored, measured, expected] =
-            sums.map(|sum| sum / count(some.len()) / f64::from(slices.sampling_radius));
+            sums.map(|sum| sum / count(some.len()) / f64::from(arrays.sampling_radius));
         println!(
             "| {depth} | {} | {certified:.2} | {grown:.2} | {:.2} | {:.0} % | {stored:.2} | {measured:.2} | {expected:.2} | {:.2} | {:.2} |",
             all.len(),
@@ -204,9 +204,9 @@ struct Pairs {
 }
 
 struct Descent<'a> {
-    a: Slices<'a>,
-    b: Slices<'a>,
-    motion: Relative,
+    a: ScanArrays<'a>,
+    b: ScanArrays<'a>,
+    relative: Relative,
     /// `true` if pairs that coverings prune are not descended into.
     excludes: bool,
     pairs: Pairs,
@@ -219,19 +219,19 @@ impl Descent<'_> {
         let mut open = vec![NodePair::ROOTS];
         while let Some(pair) = open.pop() {
             let (a, b) = (&self.a.tree, &self.b.tree);
-            if self.motion.gap(&a.bounds(pair.a), &b.bounds(pair.b)) > self.motion.slack() {
+            if self.relative.gap(&a.bounds(pair.a), &b.bounds(pair.b)) > self.relative.slack() {
                 continue;
             }
             self.seen.push(pair);
-            let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0, Extent::Discs);
+            let excluded = apart(&self.a, &self.b, pair, &self.relative, 0.0, Extent::Discs);
             let leaves = [a.topology().is_leaf(pair.a), b.topology().is_leaf(pair.b)];
             let kind = if leaves == [true; 2] { &mut self.pairs.leaves } else { &mut self.pairs.inner };
             kind[0] += 1;
             kind[1] += usize::from(excluded);
             let (of_a, of_b) = (a.enclosure(Part::Surface, pair.a), b.enclosure(Part::Surface, pair.b));
-            if self.motion.gap(&of_a, &of_b) <= self.motion.slack() {
+            if self.relative.gap(&of_a, &of_b) <= self.relative.slack() {
                 self.pairs.enclosed[0] += 1;
-                let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0, Extent::Surface);
+                let excluded = apart(&self.a, &self.b, pair, &self.relative, 0.0, Extent::Surface);
                 self.pairs.enclosed[1] += usize::from(excluded);
             }
             if leaves == [true; 2] || excluded && self.excludes {
@@ -264,19 +264,20 @@ fn exclusions(object: &Object, scan: &Scan, effort: Effort) -> Result<(), Failur
             for (excludes, sum) in [false, true].into_iter().zip(&mut sums) {
                 let frame = scan.frame();
                 let stored = Pose::IDENTITY.with_scale(frame.scale).with_translation(frame.origin);
-                let motion = Relative::new(&stored.inverse().after(&pose.after(&stored)), 16.0 / frame.scale);
+                let relative =
+                    Relative::new(&stored.inverse().after(&pose.after(&stored)), 16.0 / frame.scale);
                 let mut descent = Descent {
-                    a: scan.slices(),
-                    b: scan.slices(),
-                    motion,
+                    a: scan.arrays(),
+                    b: scan.arrays(),
+                    relative,
                     excludes,
                     pairs: *sum,
                     seen: Vec::new(),
                 };
                 descent.run();
                 *sum = descent.pairs;
-                let Descent { a, b, motion, seen, .. } = &descent;
-                let parted = |pair: &&NodePair| apart(a, b, **pair, motion, 0.0, Extent::Discs);
+                let Descent { a, b, relative, seen, .. } = &descent;
+                let parted = |pair: &&NodePair| apart(a, b, **pair, relative, 0.0, Extent::Discs);
                 let (_, time) = timed(|| black_box(seen.iter().filter(parted).count()));
                 spent = (spent.0 + seen.len(), spent.1 + nanoseconds(time));
             }

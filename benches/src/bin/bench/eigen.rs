@@ -43,8 +43,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     println!("{}", machine::description());
     println!(
         "Median of {repeats} repeats, {TOGETHER} problems at a time; errors over {problems} matrices a family, real \
-         neighbourhoods being {} of {}: worst ‖Bn − λn‖ / ‖B‖, worst error of orthonormality, answers that are not \
-         numbers or were given up. No solver has a fallback.\n",
+         neighbourhoods being {} of {}: worst ‖Bn − λn‖ / ‖B‖, worst error of orthonormality, number of failures \
+         and NaN. No solver has a fallback.\n",
         real.len(),
         object.name
     );

@@ -75,10 +75,10 @@ fn levels() -> Vec<(&'static str, Level)> {
 }
 
 /// The number of points of a group whose support contains `x`.
-fn heard(group: &PointBlock, x: [f64; 3]) -> usize {
+fn supporting(group: &PointBlock, x: [f64; 3]) -> usize {
     let distance_sq =
         |i: usize| (0..3).map(|k| (f64::from(group.position[k][i]) - x[k]).powi(2)).sum::<f64>();
-    (0..PointBlock::WIDTH).filter(|&i| distance_sq(i) < f64::from(group.horizon[i]).powi(2)).count()
+    (0..PointBlock::WIDTH).filter(|&i| distance_sq(i) < f64::from(group.support_radius[i]).powi(2)).count()
 }
 
 fn measure(object: &Object, runs: usize) -> Result<(), Failure> {
@@ -96,7 +96,7 @@ fn measure(object: &Object, runs: usize) -> Result<(), Failure> {
     let listed = count(lists.iter().sum()) / count(lists.len());
     let offered = near.iter().map(|&(i, x)| {
         let groups = scan.neighbours(block(i)).into_iter().flat_map(|(_, list)| list);
-        groups.map(|&group| heard(&scan.groups()[group as usize], x)).sum::<usize>()
+        groups.map(|&group| supporting(&scan.groups()[group as usize], x)).sum::<usize>()
     });
     let offered = count(offered.sum::<usize>()) / count(near.len());
     println!("\n## {}, {} points\n", object.name, scan.len());

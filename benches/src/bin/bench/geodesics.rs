@@ -28,8 +28,8 @@ fn least<T>(runs: usize, mut work: impl FnMut() -> T) -> (T, f64) {
     (result, best.as_secs_f64())
 }
 
-fn horizons(scan: &Scan) -> Vec<f32> {
-    scan.radii().iter().map(|&r| scan.plan().horizon(r)).collect()
+fn support_radii(scan: &Scan) -> Vec<f32> {
+    scan.radii().iter().map(|&r| scan.plan().support_radius(r)).collect()
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -113,17 +113,17 @@ fn against(mesh: &TriangleMesh, scan: &Scan, normals: &[[f32; 3]], confidence: &
 
 fn close_pairs(scan: &Scan, graph: &PointGraph, runs: usize) {
     let n = count(scan.len());
-    let horizons = horizons(scan);
+    let support_radii = support_radii(scan);
     let lengths = edge_lengths(graph.edges(), scan.positions());
     let network = Network::new(graph.edges(), &lengths);
     for paths in [Paths::Rebuilt, Paths::Stored] {
         let spent = processor_time();
         let (pairs, time) = least(runs, || {
             let lengths = edge_lengths(graph.edges(), scan.positions());
-            ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons, paths)
+            ClosePairs::build(Network::new(graph.edges(), &lengths), &support_radii, paths)
         });
         println!(
-            "* close pairs, paths {paths:?}: {:.0} points/s, {:.2} µs of processor time a point; {:.1} heard at a point, {:.0} \
+            "* close pairs, paths {paths:?}: {:.0} points/s, {:.2} µs of processor time a point; {:.1} close pairs per point, {:.0} \
              bytes a point",
             n / time,
             (processor_time() - spent).as_secs_f64() * 1e6 / n / count(runs),
@@ -165,10 +165,10 @@ fn levels(scan: &Scan, graph: &PointGraph, runs: usize, pairs: usize) {
     let lengths = edge_lengths(graph.edges(), scan.positions());
     let network = Network::new(graph.edges(), &lengths);
     let (levels, time) = least(runs, || Levels::build(network, scan.radii()));
-    let factor = scan.plan().horizon(1.0);
+    let factor = scan.plan().support_radius(1.0);
     let maps = levels.cells().iter().map(|cells| {
-        let horizons: Vec<f32> = cells.radii().iter().map(|r| factor * r).collect();
-        ClosePairs::build(cells.network(), &horizons, Paths::Rebuilt).byte_len()
+        let support_radii: Vec<f32> = cells.radii().iter().map(|r| factor * r).collect();
+        ClosePairs::build(cells.network(), &support_radii, Paths::Rebuilt).byte_len()
     });
     let maps: usize = maps.sum();
     let cells: Vec<String> = levels.cells().iter().map(|cells| cells.len().to_string()).collect();
@@ -209,7 +209,8 @@ fn levels(scan: &Scan, graph: &PointGraph, runs: usize, pairs: usize) {
 /// Measures one evaluation near points of the scan, with either kernel.
 fn kernels(scan: &Scan, graph: &PointGraph, runs: usize) {
     let lengths = edge_lengths(graph.edges(), scan.positions());
-    let pairs = ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons(scan), Paths::Rebuilt);
+    let pairs =
+        ClosePairs::build(Network::new(graph.edges(), &lengths), &support_radii(scan), Paths::Rebuilt);
     let kernel = GeodesicKernel::new(scan.plan(), scan.positions(), scan.radii(), graph.edges(), &pairs);
     let rng = &mut rng(1);
     let places: Vec<(usize, [f64; 3])> = (0..4096)
@@ -293,7 +294,8 @@ fn two_plates(gap: f64, order: Order) -> Result<[Recovered; 2], Failure> {
     let h = h * scan.frame().scale;
     let graph = PointGraph::build(scan.positions(), &GraphOptions::default())?;
     let lengths = edge_lengths(graph.edges(), scan.positions());
-    let pairs = ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons(&scan), Paths::Rebuilt);
+    let pairs =
+        ClosePairs::build(Network::new(graph.edges(), &lengths), &support_radii(&scan), Paths::Rebuilt);
     let kernel = GeodesicKernel::new(scan.plan(), scan.positions(), scan.radii(), graph.edges(), &pairs);
     let (mut scratch, mut gather) = (KernelScratch::default(), GatherScratch::default());
     let mut recovered = [Recovered::default(); 2];

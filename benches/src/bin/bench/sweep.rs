@@ -124,7 +124,7 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
         near.len(),
     );
     if !left_out.is_empty() {
-        println!("no mesh, so without: {}\n", left_out.join(", "));
+        println!("Skipped, because they need a mesh: {}\n", left_out.join(", "));
     }
     print_summary(&tracks);
     tracks.iter().for_each(print_distances);

@@ -110,8 +110,8 @@ pub(crate) fn run(options: &FigureOptions) -> Result<(), Failure> {
 
 fn tables(text: &mut String, options: &FigureOptions, folder: &Path) -> Result<(), Failure> {
     text.push_str(
-        "## Tables 1 and 2, Fig. 5\n\nFrom points or triangles in memory to slices on disk, 700 pixels along the longer side, σ = 3 t, the paper's rule (7 %); \
-         memory above the input at its peak. The paper's own figures in brackets, of the scene that ours stands for.\n\n\
+        "## Tables 1 and 2, Fig. 5\n\nPoints or triangles in memory become slices on disk, with 700 pixels along the longer side, σ = 3 t and the paper's rule (7 %). \
+         Peak memory is without the input. Numbers in brackets are the paper's, for the scene that ours stands for.\n\n\
          | scene | for | type | points or corners | with samples | seconds | MB, peak | MB of 6 slices in memory | all slices | distinct | MB on disk |\n\
          | --- | --- | --- | --: | --: | --: | --: | --: | --: | --: | --: |\n",
     );
@@ -219,10 +219,10 @@ fn table_3(text: &mut String, walked: &Walked, folder: &Path) -> Result<(), Fail
     let megabytes = |bytes: usize| count(bytes) / 1e6;
     write!(
         text,
-        "\n## Table 3: slices against a tree of points\n\nThe paper compares with an octree of 4096 cells of boxes about the points; here a kd-tree (kiddo) is asked \
-         for any point in the avatar's box, at the places of the walk. A step of the walk itself, falls, climbs and all, takes {steady:.2} µs with every slice in memory.\n\n\
+        "\n## Table 3: slices against a tree of points\n\nThe paper compares with an octree of 4096 cells of boxes around the points. Here a kd-tree (kiddo) looks for any point in \
+         the avatar's box, at the places of the walk. A step of the walk, including falls and climbs, takes {steady:.2} µs with every slice in memory.\n\n\
          | | slices | kd-tree | paper: image-based | paper: octree |\n| --- | --: | --: | --: | --: |\n\
-         | box checks a second | {:.0} | {:.0} | 30 frames a second | 16 to 30 |\n\
+         | box checks per second | {:.0} | {:.0} | 30 frames per second | 16 to 30 |\n\
          | MB | {:.1} ({:.1} with {} slices in memory) | {:.1} with the points | 143.36 | 225.44 |\n\
          | preparation, s | {:.2} | {:.2} | 13.9 | 1500 |\n",
         1e6 / by_map,

@@ -187,8 +187,8 @@ fn truths(scan: &Scan, poses: &[Vec<Pose>; DISTANCES]) -> Result<[Vec<bool>; DIS
 fn figure_7(text: &mut String, options: &Options, asked: &[(String, Scan)]) -> Result<(), Failure> {
     text.push_str("\n## Fig. 7: errors over the number of drawn points\n\n![](figure-7.svg)\n\n");
     text.push_str(
-        "Of all tests of the sweep those whose verdict is not that of the traversal, in percent: by brackets alone; with approaches \
-         too, the default.\n\n| object |",
+        "Tests of the sweep whose verdict differs from the traversal, in percent: by brackets alone, and with approaches \
+         (the default).\n\n| object |",
     );
     let points = |surfels| interpolation(surfels, false).points().map_or(0.0, f64::from);
     for surfels in SURFELS {

@@ -44,7 +44,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
 fn compare(source: &str, count: usize, seed: u64) -> Result<u32, Failure> {
     let object = Object::read(source)?.scaled()?;
     let Some(mut mesh) = rival("parry", &object)? else {
-        return Err(format!("{source} has no mesh to compare with").into());
+        return Err(format!("{source}: expected a mesh to compare with, got none").into());
     };
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;

@@ -90,10 +90,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let excused: usize = rows.values().map(|row| row.excused).sum();
     clean &= excused * THIN_ALLOWANCE <= thin;
     print_rows(&rows);
-    println!(
-        "\n{excused} of {thin} thin pairs ambiguous; {}",
-        if clean { "all right" } else { "NOT all right" }
-    );
+    println!("\n{excused} of {thin} thin pairs ambiguous; {}", if clean { "passed" } else { "FAILED" });
     Ok(clean)
 }
 

@@ -132,7 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     }
     let constant = all.frequency();
     let good = all.worst() <= TOLERANCE && all.brier(|p| p) < all.brier(|_| constant);
-    println!("\n{}", if good { "calibrated" } else { "NOT calibrated" });
+    println!("\n{}", if good { "calibrated" } else { "FAILED: not calibrated" });
     Ok(good)
 }
 

@@ -83,7 +83,7 @@ fn quick() -> Result<bool, Failure> {
         let arguments = Arguments::try_parse_from([&["verify"], words].concat())?;
         let command = arguments.command.ok_or("expected a check, got none")?;
         if let (Command::Counts(_), Some(obstacle)) = (&command, guard::counts::obstacle()) {
-            println!("no counts: {obstacle}");
+            println!("skipped: {obstacle}");
             continue;
         }
         is_clean &= run(&command)?;

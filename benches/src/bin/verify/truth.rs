@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     for name in &arguments.rivals {
         match rivals::rival(name, &object)? {
             Some(mut rival) => clean &= disagreements(rival.as_mut(), &questions, object.r) == 0,
-            None => println!("{name} needs a mesh"),
+            None => println!("expected a mesh for {name}, got none"),
         }
     }
     Ok(clean)

@@ -54,7 +54,7 @@ pub(crate) fn write(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) 
     let told = if list.found.clashes.is_empty() { "" } else { ", with the numbers of the clashes" };
     image(&pictures.overview, &format!("{a} and {b}{told}"), out)?;
     if let Some(picture) = &pictures.surroundings {
-        writeln!(out, "<h2>About the smaller scan</h2>")?;
+        writeln!(out, "<h2>Around the smaller scan</h2>")?;
         image(picture, &format!("the surroundings of the smaller scan{told}"), out)?;
     }
     if !list.found.clashes.is_empty() {
@@ -63,9 +63,9 @@ pub(crate) fn write(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) 
     }
     writeln!(
         out,
-        "<footer>Lengths are in world units. The size of a clash is that of the axis-aligned box about its contacts, \
-         one for each pair of leaves of the two scans that meets or comes too near. A distance from x to y means: proven to be \
-         at least x, shown to be at most y.</footer>"
+        "<footer>Lengths are in world units. The size of a clash is the size of the axis-aligned box around its contacts. \
+         Each pair of leaves of the two scans that touch or come too close has one contact. A distance from x to y is \
+         proven to be at least x and shown to be at most y.</footer>"
     )?;
     if !list.found.clashes.is_empty() {
         writeln!(out, "<script>\n{SCRIPT}</script>")?;
@@ -78,14 +78,14 @@ fn summary(list: &List<'_>, [a, b]: [&str; 2], out: &mut impl Write) -> io::Resu
     writeln!(out, "<p><strong>{}</strong></p>\n<ul>", escaped(&sentence(list, None)))?;
     writeln!(out, "<li><span class=\"a\"></span>a: {a}, {} points</li>", points[0])?;
     writeln!(out, "<li><span class=\"b\"></span>b: {b}, {} points</li>", points[1])?;
-    writeln!(out, "<li><span class=\"hard\"></span>hard clashes: the scans meet</li>")?;
+    writeln!(out, "<li><span class=\"hard\"></span>hard clashes: the scans touch</li>")?;
     let clearance = list.plan.clearance();
     if clearance > 0.0 {
         let near = short(clearance);
         writeln!(
             out,
-            "<li><span class=\"clearance\"></span>clearance clashes: they come nearer than {near}, and no contact was \
-             found there</li>"
+            "<li><span class=\"clearance\"></span>clearance clashes: the scans come closer than {near} without \
+             contact</li>"
         )?;
     }
     writeln!(out, "</ul>")
@@ -115,7 +115,7 @@ fn figures(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) -> io::Re
     if shown == 0 {
         return Ok(());
     }
-    writeln!(out, "<h2>Clashes from near</h2>")?;
+    writeln!(out, "<h2>Close views</h2>")?;
     if shown < all {
         writeln!(out, "<p>The first {shown} of {all}.</p>")?;
     }
@@ -123,11 +123,11 @@ fn figures(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) -> io::Re
     for (clash, picture) in list.reports().zip(&pictures.close) {
         let [id, kind, centre, size, distance, _] = cells(list, &clash).map(|cell| escaped(&cell));
         writeln!(out, "<figure id=\"clash-{id}\">")?;
-        image(picture, &format!("clash {id} from near"), out)?;
+        image(picture, &format!("close view of clash {id}"), out)?;
         let distance = if kind == "hard" { String::new() } else { format!(", distance {distance}") };
         writeln!(
             out,
-            "<figcaption><strong>{id}</strong> <span class=\"{kind}\"></span>{kind}{distance}; size {size}, about \
+            "<figcaption><strong>{id}</strong> <span class=\"{kind}\"></span>{kind}{distance}; size {size}, around \
              {centre}; point {} of a, {} of b</figcaption>\n</figure>",
             clash.source_a, clash.source_b
         )?;

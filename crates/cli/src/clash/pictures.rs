@@ -184,7 +184,7 @@ fn label(canvas: &mut Canvas, camera: &Camera, place: Vector3<f64>, number: usiz
 fn bounds(view: &Placed<'_>) -> Aabb {
     let frame = view.scan().frame();
     let to_stored = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - frame.origin[k]) / frame.scale);
-    Aabb::of(view.scan().bounds().corners().map(|p| view.placed().apply(to_stored(p))))
+    Aabb::of(view.scan().bounds().corners().map(|p| view.stored_to_world().apply(to_stored(p))))
 }
 
 fn diagonal(bounds: &Aabb) -> f64 {
@@ -261,7 +261,7 @@ impl Close {
         let radius = |k: usize| -> f64 {
             let view = list.views[k];
             let local = view.scan().radii()[stored_index(view, nearest.sources[k])];
-            f64::from(local) * view.placed().scale()
+            f64::from(local) * view.stored_to_world().scale()
         };
         let sizes = list.views.map(|view| diagonal(&bounds(view)));
         let smaller = usize::from(sizes[1] < sizes[0]);

@@ -107,7 +107,7 @@ pub(crate) fn lines(list: &List<'_>, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = rows.iter().map(line).collect();
     let left = list.found.clashes.len().saturating_sub(most);
     if left > 0 {
-        lines.push(format!("and {}; --csv, --html and --json list all", more(left)));
+        lines.push(format!("and {}; --csv, --html and --json list all clashes", more(left)));
     }
     lines
 }
@@ -156,9 +156,11 @@ pub(crate) fn sentence(list: &List<'_>, distance: Option<&Distance>) -> String {
             }
         },
         (hard, 0) => format!("{}, all hard.", clash_count(hard)),
-        (0, near) => format!("{}, no contact: all come nearer than {}.", clash_count(near), short(clearance)),
+        (0, near) => {
+            format!("{} without contact: the gaps are below {}.", clash_count(near), short(clearance))
+        }
         (hard, near) => format!(
-            "{}: {hard} hard, and {near} that {} nearer than {}.",
+            "{}: {hard} hard, and {near} without contact that {} closer than {}.",
             clash_count(hard + near),
             if near == 1 { "comes" } else { "come" },
             short(clearance)
@@ -168,7 +170,8 @@ pub(crate) fn sentence(list: &List<'_>, distance: Option<&Distance>) -> String {
         text += &format!(" Contacts up to {} apart are in one clash.", rough(list.found.link));
     }
     if !list.found.complete {
-        text += " The search took too long and was ended: clashes may be missing. Try a smaller clearance.";
+        text +=
+            " The search took too long and was stopped, so clashes may be missing. Try a smaller clearance.";
     }
     text
 }

@@ -20,13 +20,13 @@ const BLOCK: usize = 1 << 20;
 
 /// Prepares `points` points within `memory` bytes.
 pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Console) -> Result<(), CliError> {
-    let unfit = |what: String| CliError::Unfit { path: args.input.clone(), what };
+    let unsuitable = |what: String| CliError::UnsuitableFile { path: args.input.clone(), what };
     let limit = input::limit_reading(&args.input, args.format.0);
     let pieces = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
         Pieces::Points(pieces) => pieces,
         Pieces::Mesh { .. } => {
             let what = "expected points, got a mesh, which cannot be prepared on disk; raise --memory".into();
-            return Err(unfit(what));
+            return Err(unsuitable(what));
         }
     };
     let folder = output::work_folder(&args.output);
@@ -89,9 +89,9 @@ fn gather(
     expected: u64,
     console: Console,
 ) -> Result<(GatheredPoints, Filtered), CliError> {
-    let unfit = |cause: IntakeError| match cause {
+    let unsuitable = |cause: IntakeError| match cause {
         IntakeError::Work(cause) => CliError::Work(cause),
-        other => CliError::Unfit { path: args.input.clone(), what: other.to_string() },
+        other => CliError::UnsuitableFile { path: args.input.clone(), what: other.to_string() },
     };
     let name = args.input.display();
     let bar = console.rate(format_args!("measuring {name}"), expected);
@@ -102,7 +102,7 @@ fn gather(
     })?;
     drop(bar);
     let bar = console.rate(format_args!("reading {name}"), intake.given() as u64);
-    let mut gatherer = PointGatherer::new(work, &intake).map_err(unfit)?;
+    let mut gatherer = PointGatherer::new(work, &intake).map_err(unsuitable)?;
     let crop = args.filters.crop.map(|crop| Aabb { min: crop.min, max: crop.max });
     let (cropped, of_other_class) = (Cell::new(0), Cell::new(0));
     let mut without_classes = false;
@@ -120,10 +120,10 @@ fn gather(
     drop(bar);
     if without_classes {
         let what = "expected points with classes for --class, got points without; leave it out".into();
-        return Err(CliError::Unfit { path: args.input.clone(), what });
+        return Err(CliError::UnsuitableFile { path: args.input.clone(), what });
     }
     let bar = console.spinner("removing duplicate points");
-    let gathered = gatherer.finish().map_err(unfit)?;
+    let gathered = gatherer.finish().map_err(unsuitable)?;
     drop(bar);
     let of_class = args.filters.class.as_ref().map(|_| of_other_class.get());
     let filtered = Filtered::by_point(crop.map(|_| cropped.get()), of_class);

@@ -113,16 +113,16 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
         }
     };
     drop(limit);
-    let unfit = |cause| CliError::Slices { path: args.input.clone(), cause };
+    let unsuitable = |cause| CliError::Slices { path: args.input.clone(), cause };
     let (plan, work) = place(args, &options(args, matches!(source, Pieces::Mesh { .. })), &bounds, console)?;
     let [width, height, slices] = plan.grid().counts;
     let what = format!("filling {slices} slices of {width} × {height} pixels");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.or(Err(CliError::Threads(args.threads)))?;
     pool.install(|| {
-        let mut builder = SliceBuilder::new_in(&plan, &work).map_err(unfit)?;
+        let mut builder = SliceBuilder::new_in(&plan, &work).map_err(unsuitable)?;
         if builder.is_filled() {
-            console.note("going on with the work of an ended run");
+            console.note("resuming an interrupted run");
         } else {
             match &source {
                 Pieces::Points(points) => {
@@ -137,7 +137,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
                     builder.add_mesh(mesh);
                 }
             }
-            builder.keep(&work).map_err(unfit)?;
+            builder.keep(&work).map_err(unsuitable)?;
         }
         let _bar = console.spinner(format_args!("writing {}", args.output.display()));
         if work.is_in_memory() { target.save(&builder.finish()) } else { target.build(builder) }
@@ -156,16 +156,16 @@ fn place(
     bounds: &Aabb,
     console: Console,
 ) -> Result<(SlicePlan, Workspace), CliError> {
-    let unfit = |cause| CliError::Slices { path: args.input.clone(), cause };
+    let unsuitable = |cause| CliError::Slices { path: args.input.clone(), cause };
     let folder = output::work_folder(&args.output);
     let plan = SlicePlan::new(options, bounds);
     let Some(memory) = args.memory.memory.filter(|_| matches!(plan, Err(SliceError::Memory { .. }))) else {
-        let plan = plan.map_err(unfit)?;
+        let plan = plan.map_err(unsuitable)?;
         // Removes the files of a killed run on disk.
         Workspace::clear(&folder);
         return Ok((plan, Workspace::in_memory()));
     };
-    let plan = SlicePlan::on_disk(options, bounds).map_err(unfit)?;
+    let plan = SlicePlan::on_disk(options, bounds).map_err(unsuitable)?;
     let key = format!("slices {} {plan:?}", input::identity(&args.input)?);
     let work = Workspace::in_folder(&folder, &key, memory)?;
     console.note(format_args!("working on disk, in {}, which is removed at the end", folder.display()));

@@ -160,7 +160,7 @@ fn each_line<L: for<'a> Deserialize<'a>>(
         })?;
         answer(line).map_err(|what| lines.fault(what))??;
     }
-    if is_empty { Err(lines.unfit(format!("holds no lines; {form}"))) } else { Ok(()) }
+    if is_empty { Err(lines.unsuitable(format!("expected lines, got none; {form}"))) } else { Ok(()) }
 }
 
 /// Returns the object's pose in the building.

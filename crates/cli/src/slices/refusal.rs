@@ -19,23 +19,23 @@ pub(super) fn told_place(place: [f64; 3], grid: &Grid) -> String {
 
 /// Returns the error of a place, which `what` names, for a map or a route in `path`.
 pub(super) fn misplaced(path: &Path, what: &str, grid: &Grid, cause: &StartError) -> CliError {
-    let unfit = |what: String| CliError::Unfit { path: path.to_owned(), what };
+    let unsuitable = |what: String| CliError::UnsuitableFile { path: path.to_owned(), what };
     match cause {
         StartError::Misplaced { place, cause, nearest: Some(Standing { position, distance }) } => {
             let [place, nearest] = [*place, *position].map(|place| told_place(place, grid));
-            unfit(format!(
+            unsuitable(format!(
                 "{what} {place} {cause}; nearest place to stand: {nearest}, {} away",
                 short(*distance)
             ))
         }
         StartError::Misplaced { place, cause, nearest: None } => {
             let place = told_place(*place, grid);
-            unfit(format!(
+            unsuitable(format!(
                 "{what} {place} {cause}; this avatar can stand nowhere on the map; give a smaller one"
             ))
         }
         StartError::Walk(cause) => refused(path, cause),
-        other => unfit(other.to_string()),
+        other => unsuitable(other.to_string()),
     }
 }
 
@@ -43,7 +43,7 @@ pub(super) fn misplaced(path: &Path, what: &str, grid: &Grid, cause: &StartError
 pub(super) fn refused(path: &Path, cause: &WalkError) -> CliError {
     match cause {
         WalkError::TooManyPlaces { .. } | WalkError::TooMuchWork { .. } => CliError::Usage(cause.to_string()),
-        _ => CliError::Unfit { path: path.to_owned(), what: cause.to_string() },
+        _ => CliError::UnsuitableFile { path: path.to_owned(), what: cause.to_string() },
     }
 }
 
@@ -54,7 +54,7 @@ pub(super) fn no_route(path: &Path, grid: &Grid, cause: &RouteError) -> CliError
         RouteError::Goal(cause) => misplaced(path, "goal", grid, cause),
         RouteError::NoRoute { from, to, nearest, away } => {
             let [from, to, nearest] = [*from, *to, *nearest].map(|place| told_place(place, grid));
-            CliError::Unfit {
+            CliError::UnsuitableFile {
                 path: path.to_owned(),
                 what: format!(
                     "no route from {from} to {to}: the avatar gets as near as {} to the goal, at {nearest}; give \
@@ -64,6 +64,6 @@ pub(super) fn no_route(path: &Path, grid: &Grid, cause: &RouteError) -> CliError
             }
         }
         RouteError::Walk(cause) => refused(path, cause),
-        other => CliError::Unfit { path: path.to_owned(), what: other.to_string() },
+        other => CliError::UnsuitableFile { path: path.to_owned(), what: other.to_string() },
     }
 }

@@ -104,7 +104,7 @@ impl Report {
             short(self.slice_height)
         ))?;
         results.line(format_args!(
-            "obstacles  what spans more than {} upwards in a pixel ({:.1} % of a slice){}",
+            "obstacles  pixels whose points span more than {} upwards ({:.1} % of a slice){}",
             short(about.share * grid.slice_height),
             100.0 * about.share,
             of_noise(about)
@@ -139,9 +139,9 @@ fn of_noise(about: &About) -> String {
         Obstacle::Share(_) => String::new(),
         Obstacle::Slope { noise: Some(_), .. } => format!("; noise {noise}"),
         Obstacle::Slope { .. } if about.is_noise_capped() => {
-            format!("; noise {noise}, estimated, of which no more is allowed for: give higher slices")
+            format!("; noise {noise} (estimated), more than the slices allow for; give higher slices")
         }
-        Obstacle::Slope { .. } => format!("; noise {noise}, estimated"),
+        Obstacle::Slope { .. } => format!("; noise {noise} (estimated)"),
     }
 }
 

@@ -128,7 +128,7 @@ fn tell(args: &RouteArgs, grid: &Grid, found: &FoundRoute, seconds: f64) -> Resu
         })?;
     } else {
         results.line(format_args!(
-            "A route of {} over {} to {}; the shortest way over the lattice is {}. {} were looked at in {seconds:.2} s.",
+            "A route of length {} over {} to {}; the shortest path on the lattice has length {}. Searched {} in {seconds:.2} s.",
             short(found.length),
             count(found.route.points.len() as u64, "point"),
             place(found.end, grid.pixel),

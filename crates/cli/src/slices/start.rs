@@ -57,7 +57,7 @@ pub(super) fn run(args: &StartArgs) -> Result<(), CliError> {
     drop(bar);
     let Some(Standing { position, distance }) = found.map_err(failed)? else {
         let what = "this avatar can stand nowhere on the map; give a smaller one".to_owned();
-        return Err(CliError::Unfit { path: args.folder.clone(), what });
+        return Err(CliError::UnsuitableFile { path: args.folder.clone(), what });
     };
     let floor = storey_of(&storeys, grid.up.to_map(position)[2]);
     let mut results = Results::new();

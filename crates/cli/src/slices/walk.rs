@@ -251,7 +251,7 @@ fn check_outputs(args: &WalkArgs) -> Result<(), CliError> {
 fn refused(args: &WalkArgs, cause: StoreError) -> CliError {
     match cause {
         StoreError::Walk(cause @ (WalkError::NotFinite { .. } | WalkError::FarOff { .. })) => {
-            CliError::Unfit { path: args.route.clone(), what: cause.to_string() }
+            CliError::UnsuitableFile { path: args.route.clone(), what: cause.to_string() }
         }
         StoreError::Walk(cause @ WalkError::TooShort { .. }) => CliError::Usage(cause.to_string()),
         other => other.into(),
@@ -261,10 +261,10 @@ fn refused(args: &WalkArgs, cause: StoreError) -> CliError {
 fn read_route(args: &WalkArgs) -> Result<Route, CliError> {
     crate::input::check_there(&args.route)?;
     let text = std::fs::read_to_string(&args.route).map_err(CliError::reading(&args.route))?;
-    let unfit = |what| CliError::Unfit { path: args.route.clone(), what };
+    let unsuitable = |what| CliError::UnsuitableFile { path: args.route.clone(), what };
     let route: Route = serde_json::from_str(&text)
-        .map_err(|e| unfit(format!(r#"{e}; a route is {{"start":[x,y,z],"points":[[x,y],…]}}"#)))?;
-    route.check().map_err(|e| unfit(e.to_string()))?;
+        .map_err(|e| unsuitable(format!(r#"{e}; a route is {{"start":[x,y,z],"points":[[x,y],…]}}"#)))?;
+    route.check().map_err(|e| unsuitable(e.to_string()))?;
     Ok(route)
 }
 
@@ -279,7 +279,7 @@ fn sentence(ended: Ended, route: &Route, tally: &Tally) -> String {
     match ended {
         Ended::Arrived => format!("Arrived at ({end}) after {far}."),
         Ended::Stuck { point } => {
-            format!("Stopped at ({end}) after {far}{}: something is in the way.", on_the_way(point))
+            format!("Stopped at ({end}) after {far}{}: an obstacle is in the way.", on_the_way(point))
         }
         Ended::LeftMap { point } => {
             format!("Fell below the map at ({end}) after {far}{}.", on_the_way(point))

@@ -48,7 +48,7 @@ fn a_map_larger_than_memory_is_made_on_disk() {
     assert!(!child.wait().unwrap().success(), "it was killed");
     let before = files_of(&place, "disk");
     let done = place.ok(&args);
-    assert!(done.errors.contains("going on with the work of an ended run"), "{}", done.errors);
+    assert!(done.errors.contains("resuming an interrupted run"), "{}", done.errors);
     assert!(!place.path("disk.work").exists());
     place.ok(&build("house.xyz", "memory", &[]));
     assert_eq!(files_of(&place, "disk"), files_of(&place, "memory"));

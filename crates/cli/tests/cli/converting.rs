@@ -74,7 +74,7 @@ fn points_are_chosen_by_box_and_class() {
     place.refused(
         1,
         &["preprocess", "plain.xyz", "-o", "b.nm", "--class", "2"],
-        &["plain.xyz", "--class 2", "no classes"],
+        &["plain.xyz", "--class 2", "expected points with classes"],
     );
 }
 

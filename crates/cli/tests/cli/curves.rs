@@ -47,7 +47,7 @@ fn two_spheres_cut_each_other_in_a_circle() {
     assert!(std::fs::read(place.path("c.png")).unwrap().starts_with(b"\x89PNG"));
 
     let people = place.ok(&asked[..7]).results;
-    assert!(people.starts_with("They cut each other in 1 closed curve, length 5.4"), "{people}");
+    assert!(people.starts_with("They intersect in 1 closed curve, length 5.4"), "{people}");
     let finer = [&asked[..8], &["--spacing", "0.01", "--tolerance", "1e-7"]].concat();
     let finer = place.ok(&finer).json().remove(0);
     assert!(
@@ -65,7 +65,7 @@ fn ends_misses_and_budgets_are_said() {
     let upright = "1 0 0 0 0 0 -1 0.3 0 1 0 0 0 0 0 1";
     let asked = ["curve", "bowl.nm", "wall.xyz", "--pose-b", upright, "-o", "c.ply"];
     let people = place.ok(&asked).results;
-    assert!(people.starts_with("They cut each other in 1 open curve, length 3"), "{people}");
+    assert!(people.starts_with("They intersect in 1 open curve, length 3"), "{people}");
     assert!(people.contains("Ends: 2 at the border of a."), "{people}");
     let short = place.ok(&[&asked[..], &["--work", "300", "--json"]].concat()).json().remove(0);
     assert_eq!(short["complete"], false, "{short}");
@@ -78,7 +78,7 @@ fn ends_misses_and_budgets_are_said() {
     let missed = ["curve", "bowl.nm", "wall.xyz", "--pose-b", &away, "-o", "none.ply"];
     let people = place.ok(&missed).results;
     let gap = people
-        .strip_prefix("They do not cut; at least ")
+        .strip_prefix("They do not intersect; they are at least ")
         .and_then(|rest| rest.split_once(" apart (certified).\n"));
     let gap: f64 = gap.unwrap_or_else(|| panic!("{people}")).0.parse().unwrap();
     assert!((7.0..9.0).contains(&gap), "{people}");
@@ -109,7 +109,7 @@ fn contacts_without_a_curve_are_said() {
     let pose = shift(0.5, 0.5, 1.0);
     let asked = ["curve", "pole.xyz", "plate.xyz", "--pose-b", &pose, "-o", "c.ply"];
     let people = place.ok(&asked).results;
-    assert!(!people.contains("They do not cut"), "{people}");
+    assert!(!people.contains("They do not intersect"), "{people}");
     assert!(
         people.contains("But they touch at (0.5") && people.contains("where no surface is sampled"),
         "{people}"

@@ -147,7 +147,11 @@ fn where_there_is_no_route_that_is_told() {
             &["goal [9, 6.5, 0.1] is inside an obstacle; nearest"],
         ),
         (1, [&route[..], &["--to", "3,6,1.5"]].concat(), &["goal [3, 6, 1.5] is in the air; nearest"]),
-        (1, reach(&["--start", "12,8,0.1"]), &["start [12, 8, 0.1] is too low under a ceiling", "nearest"]),
+        (
+            1,
+            reach(&["--start", "12,8,0.1"]),
+            &["start [12, 8, 0.1] is under a ceiling that is too low", "nearest"],
+        ),
         (1, reach(&["--start", "-9,8,0.1"]), &["start [-9, 8, 0.1] is outside the map; nearest"]),
         (2, reach(&[]), &["--start"]),
         (2, reach(&["--start", "1,2"]), &["three numbers"]),

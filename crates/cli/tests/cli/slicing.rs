@@ -157,7 +157,7 @@ fn what_is_dropped_and_what_noise_is_reckoned_with_is_told() {
     let (people, json) = told(&[]);
     let noise = json["noise"].as_f64().unwrap();
     assert!((0.005..0.02).contains(&noise) && json["noise_estimated"] == true, "{json}");
-    assert!(people.contains("; noise 0.0") && people.contains(", estimated\n"), "{people}");
+    assert!(people.contains("; noise 0.0") && people.contains(" (estimated)\n"), "{people}");
     let (people, json) = told(&["--noise", "0.02"]);
     assert_eq!((&json["noise"], &json["noise_estimated"]), (&0.02.into(), &false.into()), "{json}");
     assert!(people.contains("; noise 0.02\n"), "{people}");
@@ -281,7 +281,7 @@ fn an_avatar_walks_up_the_stairs_and_leaves_a_trace() {
     assert!(people.starts_with("Arrived at (8, 9, 3"), "{people}");
     place.write("wall.json", "{\"start\":[7,6.5,0.1],\"points\":[[12,6.5]]}");
     let people = place.ok(&["slices", "walk", "house", "--route", "wall.json"]).results;
-    assert!(people.contains("on the way to point 1: something is in the way"), "{people}");
+    assert!(people.contains("on the way to point 1: an obstacle is in the way"), "{people}");
 }
 
 #[test]
@@ -373,7 +373,7 @@ fn what_does_not_serve_is_refused_by_name() {
         (1, vec!["slices", "build", "house.xyz", "-o", "."], &["other files"]),
         (1, vec!["slices", "inspect", "."], &["index.nms", "no such file"]),
         (1, query("boxes.jsonl"), &["boxes.jsonl", "line 2", "column"]),
-        (1, query("empty.jsonl"), &["holds no lines"]),
+        (1, query("empty.jsonl"), &["expected lines, got none"]),
         (1, query("inside.jsonl"), &["line 1", "min at most max"]),
         (2, vec!["slices", "query", "house"], &["--boxes"]),
         (

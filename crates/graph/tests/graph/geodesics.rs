@@ -115,11 +115,11 @@ fn edges_that_vanish_beside_what_they_add_to_still_make_a_path() {
         let graph = Adjacency::from_edges(points.len(), &edges);
         let lengths = edge_lengths(&graph, &points);
         let network = Network::new(&graph, &lengths);
-        let mut horizons = vec![0.0; points.len()];
-        (horizons[0], horizons[n as usize]) = (2e3, 2e3);
+        let mut support_radii = vec![0.0; points.len()];
+        (support_radii[0], support_radii[n as usize]) = (2e3, 2e3);
         let mut path = Vec::new();
         for paths in [Paths::Rebuilt, Paths::Stored] {
-            let pairs = ClosePairs::build(network, &horizons, paths);
+            let pairs = ClosePairs::build(network, &support_radii, paths);
             for ends in [[n, 0], [0, n]] {
                 let length = pairs.path(network, ends, &mut GeodesicScratch::default(), &mut path).unwrap();
                 assert!((length - 1e3).abs() < 0.5, "{length}");
@@ -138,16 +138,16 @@ fn is_near(distance: f32, exact: f64, share: f64) -> bool {
 }
 
 #[test]
-fn the_map_holds_every_pair_that_is_heard_and_no_other() {
+fn the_map_holds_every_pair_within_a_support_radius_and_no_other() {
     for cloud in small_clouds() {
         let network = Network::new(&cloud.graph, &cloud.lengths);
         for reach in [0.0, 3.0, 7.0] {
-            let horizons: Vec<f32> = cloud.radii.iter().map(|r| reach * r).collect();
-            let pairs = ClosePairs::build(network, &horizons, Paths::Rebuilt);
+            let support_radii: Vec<f32> = cloud.radii.iter().map(|r| reach * r).collect();
+            let pairs = ClosePairs::build(network, &support_radii, Paths::Rebuilt);
             let mut naive = vec![Vec::new(); cloud.points.len()];
             for j in 0..cloud.points.len() {
                 for (i, &(_, d)) in relaxed(&cloud.graph, &cloud.points, j).iter().enumerate() {
-                    if d <= horizons[j] {
+                    if d <= support_radii[j] {
                         naive[i].push((d.to_bits(), u32::try_from(j).unwrap()));
                     }
                 }
@@ -155,11 +155,11 @@ fn the_map_holds_every_pair_that_is_heard_and_no_other() {
             for (i, list) in naive.iter_mut().enumerate() {
                 list.sort_unstable();
                 let found = pairs.of(i);
-                assert_eq!(found.len(), list.len(), "heard at {i} with {reach}");
+                assert_eq!(found.len(), list.len(), "list of {i} with {reach}");
                 assert!(found.clone().is_sorted_by(|a, b| a.distance <= b.distance), "at {i}");
                 for (close, &(bits, point)) in found.zip(&*list) {
                     let exact = f32::from_bits(bits);
-                    assert_eq!(close.point, point, "heard at {i} with {reach}");
+                    assert_eq!(close.point, point, "list of {i} with {reach}");
                     assert!(is_near(close.distance, exact.into(), ROUNDED), "{close:?} for {exact}");
                     let id = u32::try_from(i).unwrap();
                     assert_eq!(pairs.distance(id, point), Some(close.distance));
@@ -193,9 +193,9 @@ fn what_four_bytes_do_not_hold_is_as_right() {
         .map(|[i, j]| gap(place[i].min(place[j])) as f32)
         .collect();
     let network = Network::new(&graph, &lengths);
-    let horizons = vec![1.5; COUNT as usize];
-    let pairs = ClosePairs::build(network, &horizons, Paths::Rebuilt);
-    let stored = ClosePairs::build(network, &horizons, Paths::Stored);
+    let support_radii = vec![1.5; COUNT as usize];
+    let pairs = ClosePairs::build(network, &support_radii, Paths::Rebuilt);
+    let stored = ClosePairs::build(network, &support_radii, Paths::Stored);
     assert!(pairs.byte_len() > 9 * pairs.pair_count(), "half of them stand beside");
     let (mut scratch, mut path) = (GeodesicScratch::default(), Vec::new());
     let mut counted = 0;
@@ -224,9 +224,9 @@ fn stored_and_rebuilt_paths_are_shortest() {
     let shapes = [Cloud::of_form(torus(1.0, 0.4), 0.1, 0.2, 3), Cloud::of_form(torus(1.0, 0.4), 0.1, 0.0, 0)];
     for cloud in small_clouds().into_iter().chain(shapes) {
         let network = Network::new(&cloud.graph, &cloud.lengths);
-        let horizons: Vec<f32> = cloud.radii.iter().map(|r| 3.0 * r).collect();
-        let rebuilt = ClosePairs::build(network, &horizons, Paths::Rebuilt);
-        let stored = ClosePairs::build(network, &horizons, Paths::Stored);
+        let support_radii: Vec<f32> = cloud.radii.iter().map(|r| 3.0 * r).collect();
+        let rebuilt = ClosePairs::build(network, &support_radii, Paths::Rebuilt);
+        let stored = ClosePairs::build(network, &support_radii, Paths::Stored);
         assert_eq!([rebuilt.paths(), stored.paths()], [Paths::Rebuilt, Paths::Stored]);
         let (mut scratch, mut search, mut path) =
             (GeodesicScratch::default(), GeodesicScratch::default(), Vec::new());

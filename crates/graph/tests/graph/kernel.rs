@@ -16,8 +16,9 @@ struct Sheet {
 impl Sheet {
     fn new(cloud: Cloud, kernel: Kernel) -> Self {
         let plan = SurfacePlan::new(&SurfaceOptions::default().with_kernel(kernel), 1.0, 1.0).unwrap();
-        let horizons: Vec<f32> = cloud.radii.iter().map(|&r| plan.horizon(r)).collect();
-        let pairs = ClosePairs::build(Network::new(&cloud.graph, &cloud.lengths), &horizons, Paths::Rebuilt);
+        let support_radii: Vec<f32> = cloud.radii.iter().map(|&r| plan.support_radius(r)).collect();
+        let pairs =
+            ClosePairs::build(Network::new(&cloud.graph, &cloud.lengths), &support_radii, Paths::Rebuilt);
         Self { cloud, plan, pairs }
     }
 
@@ -131,19 +132,21 @@ fn distances_from_the_foot_are_those_of_its_ends_and_go_over_smoothly() {
         assert_eq!(kernel.evaluate_at(id, &mut scratch).0, at, "at point {i}");
         // At a point, the list of the point contributes, except for points exactly at their support
         // radius.
-        let heard = kernel.hear(&foot, &mut scratch).to_vec();
-        let strict =
-            ring.pairs.of(i).filter(|c| c.distance < ring.plan.horizon(ring.cloud.radii[c.point as usize]));
-        assert_eq!(heard, strict.collect::<Vec<_>>());
+        let supporting = kernel.find_supporting(&foot, &mut scratch).to_vec();
+        let strict = ring
+            .pairs
+            .of(i)
+            .filter(|c| c.distance < ring.plan.support_radius(ring.cloud.radii[c.point as usize]));
+        assert_eq!(supporting, strict.collect::<Vec<_>>());
         // The midpoint of an edge yields the same points, whichever end comes first.
         let other = ring.cloud.graph.of(i)[0];
         let there = foot_between(&ring, [id, other], 0.5);
         let back = foot_between(&ring, [other, id], 0.5);
         let sorted = |foot, scratch: &mut KernelScratch| {
-            let mut heard: Vec<(u32, f32)> =
-                kernel.hear(&foot, scratch).iter().map(|c| (c.point, c.distance)).collect();
-            heard.sort_unstable_by_key(|c| c.0);
-            heard
+            let mut supporting: Vec<(u32, f32)> =
+                kernel.find_supporting(&foot, scratch).iter().map(|c| (c.point, c.distance)).collect();
+            supporting.sort_unstable_by_key(|c| c.0);
+            supporting
         };
         let (a, b) = (sorted(there, &mut scratch), sorted(back, &mut scratch));
         assert_eq!(a.iter().map(|c| c.0).collect::<Vec<_>>(), b.iter().map(|c| c.0).collect::<Vec<_>>());
@@ -173,8 +176,8 @@ fn weights_are_those_of_the_formulas_at_every_level() {
             // Klein & Zachmann 2005, eq. 1 to 5.
             let foot = ring.kernel().foot(x, nearest);
             let weigh = |c: &Close| {
-                let horizon = f64::from(ring.plan.horizon(ring.cloud.radii[c.point as usize]));
-                let t = (f64::from(c.distance) / horizon).powi(2);
+                let support_radius = f64::from(ring.plan.support_radius(ring.cloud.radii[c.point as usize]));
+                let t = (f64::from(c.distance) / support_radius).powi(2);
                 let q = t.sqrt();
                 let w = match kernel {
                     Kernel::Gaussian => 1e-4_f64.powf(t),
@@ -182,17 +185,18 @@ fn weights_are_those_of_the_formulas_at_every_level() {
                 };
                 (w, ring.cloud.points[c.point as usize].map(f64::from))
             };
-            let heard: Vec<_> = ring.kernel().hear(&foot, &mut best).iter().map(weigh).collect();
-            let total: f64 = heard.iter().map(|(w, _)| w).sum();
-            let mean = [0, 1, 2].map(|k| heard.iter().map(|(w, p)| w * p[k]).sum::<f64>() / total);
+            let supporting: Vec<_> =
+                ring.kernel().find_supporting(&foot, &mut best).iter().map(weigh).collect();
+            let total: f64 = supporting.iter().map(|(w, _)| w).sum();
+            let mean = [0, 1, 2].map(|k| supporting.iter().map(|(w, p)| w * p[k]).sum::<f64>() / total);
             let about = |j: usize, k: usize| {
-                heard.iter().map(|(w, p)| w * (p[j] - mean[j]) * (p[k] - mean[k])).sum::<f64>() / total
+                supporting.iter().map(|(w, p)| w * (p[j] - mean[j]) * (p[k] - mean[k])).sum::<f64>() / total
             };
             let c = [about(0, 0), about(0, 1), about(0, 2), about(1, 1), about(1, 2), about(2, 2)];
             let normal = nearmiss_surface::symmetric_eigen(c).vectors[0];
             let f: f64 = (0..3).map(|k| normal[k] * (mean[k] - x[k])).sum();
             assert!((f.abs() - found.f.abs()).abs() < 1e-4 * h, "{kernel:?} at {i}: {} for {f}", found.f);
-            assert_eq!(found.support as usize, heard.len());
+            assert_eq!(found.support as usize, supporting.len());
         }
     });
 }

@@ -10,7 +10,7 @@ use nearmiss_testdata::shapes::torus;
 
 struct Stored {
     cloud: Cloud,
-    horizons: Vec<f32>,
+    support_radii: Vec<f32>,
     pairs: ClosePairs,
     levels: Levels,
     bytes: Vec<u8>,
@@ -19,33 +19,38 @@ struct Stored {
 fn stored() -> Stored {
     let cloud = Cloud::of_form(torus(1.0, 0.4), 0.15, 0.1, 3);
     let network = Network::new(&cloud.graph, &cloud.lengths);
-    let horizons: Vec<f32> = cloud.radii.iter().map(|r| 3.0 * r).collect();
-    let pairs = ClosePairs::build(network, &horizons, Paths::Stored);
+    let support_radii: Vec<f32> = cloud.radii.iter().map(|r| 3.0 * r).collect();
+    let pairs = ClosePairs::build(network, &support_radii, Paths::Stored);
     let levels = Levels::build(network, &cloud.radii);
     let mut writer = Writer::new(*b"TEST", 1);
     pairs.add_to(&mut writer, 0).unwrap();
     levels.add_to(&mut writer).unwrap();
     let mut bytes = Vec::new();
     writer.write_to(&mut bytes).unwrap();
-    Stored { cloud, horizons, pairs, levels, bytes }
+    Stored { cloud, support_radii, pairs, levels, bytes }
 }
 
 #[test]
 fn what_is_stored_comes_back() {
-    let Stored { cloud, horizons, pairs, levels, bytes } = stored();
+    let Stored { cloud, support_radii, pairs, levels, bytes } = stored();
     let file = File::from_bytes(bytes, Check::Full).unwrap();
-    let again = ClosePairs::load(&file, 0, (horizons.len(), |i: usize| horizons[i]), Check::Full).unwrap();
+    let again =
+        ClosePairs::load(&file, 0, (support_radii.len(), |i: usize| support_radii[i]), Check::Full).unwrap();
     assert_eq!((&again, again.paths()), (&pairs, Paths::Stored));
     assert_eq!(Levels::load(&file, cloud.points.len(), Check::Full).unwrap(), levels);
     assert!(!levels.cells().is_empty());
-    let wrong =
-        ClosePairs::load(&file, 0, (horizons.len() - 1, |i: usize| horizons[i + 1]), Check::Structure)
-            .unwrap_err();
+    let wrong = ClosePairs::load(
+        &file,
+        0,
+        (support_radii.len() - 1, |i: usize| support_radii[i + 1]),
+        Check::Structure,
+    )
+    .unwrap_err();
     assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { .. })), "{wrong}");
     let wrong = Levels::load(&file, cloud.points.len() + 1, Check::Structure).unwrap_err();
     assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { .. })), "{wrong}");
     assert!(matches!(
-        ClosePairs::load(&file, 1, (horizons.len(), |i: usize| horizons[i]), Check::Structure),
+        ClosePairs::load(&file, 1, (support_radii.len(), |i: usize| support_radii[i]), Check::Structure),
         Err(LoadError::Open(_))
     ));
 }
@@ -63,8 +68,8 @@ fn lists_of_near_and_far_points_stay_in_order() {
         .flat_map(|i| graph.of(i).iter().map(move |&j| length(u32::try_from(i).unwrap(), j)))
         .collect();
     let network = Network::new(&graph, &lengths);
-    let horizons = vec![3.0; COUNT];
-    let pairs = ClosePairs::build(network, &horizons, Paths::Rebuilt);
+    let support_radii = vec![3.0; COUNT];
+    let pairs = ClosePairs::build(network, &support_radii, Paths::Rebuilt);
     for i in [id(299), id(300)] {
         let list: Vec<f32> = pairs.of(i as usize).map(|close| close.distance).collect();
         assert!(list.len() > 50 && list.windows(2).all(|two| two[0] <= two[1]), "{list:?}");
@@ -75,14 +80,14 @@ fn lists_of_near_and_far_points_stay_in_order() {
     writer.write_to(&mut bytes).unwrap();
     let file = File::from_bytes(bytes, Check::Full).unwrap();
     assert_eq!(
-        ClosePairs::load(&file, 0, (horizons.len(), |i: usize| horizons[i]), Check::Full).unwrap(),
+        ClosePairs::load(&file, 0, (support_radii.len(), |i: usize| support_radii[i]), Check::Full).unwrap(),
         pairs
     );
 }
 
 #[test]
 fn no_byte_changed_leads_out_of_the_arrays() {
-    let Stored { cloud, horizons, bytes, .. } = stored();
+    let Stored { cloud, support_radii, bytes, .. } = stored();
     let network = Network::new(&cloud.graph, &cloud.lengths);
     let plan = SurfacePlan::new(&SurfaceOptions::default(), 1.0, 1.0).unwrap();
     let n = u32::try_from(cloud.points.len()).unwrap();
@@ -100,7 +105,12 @@ fn no_byte_changed_leads_out_of_the_arrays() {
             // Opens without comparing checksums.
             let file = File::from_bytes(changed, Check::Structure).unwrap();
             tried += 1;
-            match ClosePairs::load(&file, 0, (horizons.len(), |i: usize| horizons[i]), Check::Structure) {
+            match ClosePairs::load(
+                &file,
+                0,
+                (support_radii.len(), |i: usize| support_radii[i]),
+                Check::Structure,
+            ) {
                 Ok(lying) => {
                     let kernel =
                         GeodesicKernel::new(&plan, &cloud.points, &cloud.radii, &cloud.graph, &lying);

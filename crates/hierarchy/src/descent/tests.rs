@@ -59,7 +59,7 @@ fn leaves_in_lanes_are_their_points() {
         [(9, 16), (16, 16), (17, 16), (33, 16), (48, 16), (700, 16), (700, 5), (900, 40)]
     {
         let scan = scan(rng, count, [1.0; 3], leaf_size);
-        let (topology, leaves) = (scan.topology(), scan.slices().leaves);
+        let (topology, leaves) = (scan.topology(), scan.arrays().leaves);
         for number in 0..topology.leaves() {
             let bounds = scan.tree().bounds(topology.leaf(number));
             for (block, first, points) in leaves.blocks(number) {
@@ -105,7 +105,7 @@ fn sixteen_pairs_at_once_are_what_one_by_one_is() {
     ];
     let (mut near_ones, mut others) = (0, 0);
     for round in 0..3000 {
-        let [a, b] = [&scans[round % 3], &scans[round / 3 % 3]].map(PointHierarchy::slices);
+        let [a, b] = [&scans[round % 3], &scans[round / 3 % 3]].map(PointHierarchy::arrays);
         let scale = [1.0, 0.3, 7.0][round % 3];
         let turned = Pose::from_axis_angle(unit_vector(rng), 3.0);
         let relative = Relative::new(&turned.with_scale(scale).with_translation(point_in(rng, 1.0)), 8.0);

@@ -57,7 +57,7 @@ impl PointHierarchy {
             let bounds = tree.bounds(id);
             for i in self.topology.points(id) {
                 if bounds.reach < self.arrays.radii[i] {
-                    return wrong("the reach of node", id.index());
+                    return wrong("the greatest radius of node", id.index());
                 }
                 if !self.box_holds(id, i) {
                     return wrong("the box of node", id.index());
@@ -68,7 +68,7 @@ impl PointHierarchy {
         let mut sources: Vec<u32> = self.arrays.source.to_vec();
         sources.sort_unstable();
         match sources.windows(2).find(|two| two[0] == two[1]) {
-            Some(two) => wrong("the place in the input, stored twice,", two[0] as usize),
+            Some(two) => wrong("the repeated source index", two[0] as usize),
             None => Ok(()),
         }
     }
@@ -78,7 +78,7 @@ impl PointHierarchy {
         let bounds = self.tree().bounds(id);
         let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let d = double(self.positions()[i]) - double(bounds.centre);
-        let ball = f64::from(self.slices().ball(i).max(self.slices().obstacle_ball(i)));
+        let ball = f64::from(self.arrays().ball(i).max(self.arrays().obstacle_ball(i)));
         (0..3).all(|k| {
             let axis = double(bounds.axes[k]);
             let spread = f64::from(self.discs().get(i)) * double(self.arrays.normals[i]).cross(&axis).norm();

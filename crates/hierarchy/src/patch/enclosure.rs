@@ -96,14 +96,14 @@ impl Surroundings {
         self.reach = locality.reach * GROWN;
         #[expect(clippy::cast_possible_truncation, reason = "a constant")]
         let border = BORDER as f32 * GROWN;
-        self.border = border * index.plan.bandwidth(1.0) / index.plan.horizon(1.0);
+        self.border = border * index.plan.bandwidth(1.0) / index.plan.support_radius(1.0);
         self.blocks.clear();
         for &id in &locality.blocks {
             let mut block = index.blocks[id as usize];
             for k in 0..3 {
                 block.position[k].iter_mut().for_each(|x| *x -= origin[k]);
             }
-            block.horizon.iter_mut().for_each(|h| *h *= GROWN);
+            block.support_radius.iter_mut().for_each(|h| *h *= GROWN);
             self.blocks.push(block);
         }
     }
@@ -136,12 +136,12 @@ impl Surroundings {
         let (mut low, mut high, mut most) = (zero, zero, zero);
         for block in &self.blocks {
             let d = seen_from(simd, &block.position, p);
-            let horizon = f32x16::load_array_ref(simd, &block.horizon);
-            let within = horizon + reach;
+            let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
+            let within = support_radius + reach;
             let reaches: mask32x16<S> = product(d, d).simd_lt(within * within);
             let height = simd.select_f32x16(reaches, along(d, normal), zero);
-            let heard = simd.select_f32x16(reaches, horizon, zero);
-            (low, high, most) = (height.min(low), height.max(high), heard.max(most));
+            let radius = simd.select_f32x16(reaches, support_radius, zero);
+            (low, high, most) = (height.min(low), height.max(high), radius.max(most));
         }
         let margin = self.border * greatest(most, 0.0);
         (least(low, 0.0) - margin, greatest(high, 0.0) + margin)
@@ -257,14 +257,14 @@ impl LeafBounds {
                 at[k] = along(d, axes[k]);
                 far[k] = (-(at[k] - own_low[k])).max(at[k] - own_high[k]).max(zero);
             }
-            let horizon = f32x16::load_array_ref(simd, &block.horizon);
-            let within = horizon + reach;
+            let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
+            let within = support_radius + reach;
             let is_near: mask32x16<S> = product(far, far).simd_lt(within * within);
             for k in 0..3 {
                 low[k] = simd.select_f32x16(is_near, at[k].min(low[k]), low[k]);
                 high[k] = simd.select_f32x16(is_near, at[k].max(high[k]), high[k]);
             }
-            most = simd.select_f32x16(is_near, horizon.max(most), most);
+            most = simd.select_f32x16(is_near, support_radius.max(most), most);
         }
         let margin = surroundings.border * greatest(most, 0.0);
         let mut bounds = Self { axes, origin, low: own_low, high: own_high };

@@ -69,8 +69,8 @@ pub(crate) struct Surfel {
 pub(crate) struct Surfels {
     pub(crate) normals: Room<[f32; 3]>,
     pub(crate) codes: Room<PointCode>,
-    /// The radius of each point's ball: the greater of [`Slices::ball`](crate::Slices::ball) and
-    /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball).
+    /// The radius of each point's ball: the greater of [`ScanArrays::ball`](crate::ScanArrays::ball) and
+    /// [`ScanArrays::obstacle_ball`](crate::ScanArrays::obstacle_ball).
     pub(crate) balls: Room<f32>,
     /// Solids around the disc, the ball and the cell of each point.
     pub(crate) cells: Room<Solid>,
@@ -262,7 +262,7 @@ impl Leaf<'_> {
                 let (mut cells, mut obstacle) = (bounds.cells(), bounds.cells());
                 let mut has_cells = false;
                 for ((p, &radius), fit) in self.positions.iter().zip(self.radii).zip(fits) {
-                    let near = index.heard(simd, &locality.groups, *p, 0.0, near);
+                    let near = index.supporting(simd, &locality.groups, *p, 0.0, near);
                     let blocks = || near.iter().map(|&block| &index.blocks[block as usize]);
                     let gap = widest_gap(simd, *p, fit.normal, blocks());
                     let cell = surroundings.cell(simd, *p, fit.normal, radius, blocks());
@@ -323,8 +323,9 @@ fn widest_gap<'a, S: Simd>(
         let quarter = simd.select_f32x16(y.simd_ge(0.0), -(share - 1.0), share + 3.0);
         let turn = quarter * (SECTORS as f32 / 4.0);
         let sector = simd.select_f32x16(turn.simd_lt(SECTORS as f32), turn, f32x16::splat(simd, 0.0));
-        let horizon = f32x16::load_array_ref(simd, &block.horizon);
-        let counts: mask32x16<S> = product(d, d).simd_lt(horizon * horizon) & length.simd_gt(0.0);
+        let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
+        let counts: mask32x16<S> =
+            product(d, d).simd_lt(support_radius * support_radius) & length.simd_gt(0.0);
         taken |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
     }
     let taken = taken.to_array().into_iter().fold(0, |all, bits| all | u64::from(bits.cast_unsigned()));

@@ -85,7 +85,7 @@ const SHARES: [f32; 256] = {
     shares
 };
 
-/// The ball radius of a point before [`crate::Slices::dense`] in local radii, by its code.
+/// The ball radius of a point before [`crate::ScanArrays::dense`] in local radii, by its code.
 pub(crate) const DENSE_SHARES: [f32; 256] = {
     let mut shares = [0.0; 256];
     let mut code = 0;

@@ -45,7 +45,7 @@ pub struct GatherScratch {
     /// The groups that a descent found.
     pub(crate) found: Vec<u32>,
     /// The blocks whose support may contain x.
-    heard: Vec<u32>,
+    supporting: Vec<u32>,
     /// Intermediate values of half blocks.
     halves: Vec<HalfBlock>,
 }
@@ -61,7 +61,7 @@ impl GatherScratch {
     /// affect results.
     #[must_use]
     pub fn at(level: Level) -> Self {
-        Self { level, block: 0, found: Vec::new(), heard: Vec::new(), halves: Vec::new() }
+        Self { level, block: 0, found: Vec::new(), supporting: Vec::new(), halves: Vec::new() }
     }
 }
 
@@ -92,7 +92,7 @@ impl<'a> Index<'a> {
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
         let place = centre.rounded();
-        let GatherScratch { level, block, found, heard, halves } = scratch;
+        let GatherScratch { level, block, found, supporting, halves } = scratch;
         let mut list = self.list(*block, place, 0.0);
         if list.is_none() {
             *block = self.nearest_block(*level, place);
@@ -104,7 +104,7 @@ impl<'a> Index<'a> {
         });
         dispatch!(*level, simd => simd.vectorize(
             #[inline(always)]
-            || self.moments(simd, &centre, list, heard, halves).evaluate(self.plan, x),
+            || self.moments(simd, &centre, list, supporting, halves).evaluate(self.plan, x),
         ))
     }
 
@@ -173,29 +173,29 @@ impl<'a> Index<'a> {
     }
 
     /// Finds the blocks of `groups`, which must ascend, whose support may come within `distance` of
-    /// `x`. Writes them to the front of `heard` and returns that part.
+    /// `x`. Writes them to the front of `supporting` and returns that part.
     #[inline(always)]
-    pub(crate) fn heard<'b, S: Simd>(
+    pub(crate) fn supporting<'b, S: Simd>(
         &self,
         simd: S,
         groups: &[u32],
         x: [f32; 3],
         distance: f32,
-        heard: &'b mut Vec<u32>,
+        supporting: &'b mut Vec<u32>,
     ) -> &'b mut [u32] {
         let most = (groups.len() + 1) * PointBlock::WIDTH;
-        if heard.len() < most {
-            heard.resize(most, 0);
+        if supporting.len() < most {
+            supporting.resize(most, 0);
         }
-        let (balls, heard, mut count) = (self.groups, &mut heard[..most], 0);
+        let (balls, supporting, mut count) = (self.groups, &mut supporting[..most], 0);
         for &group in groups {
             let balls = balls.get(group as usize);
-            let room = heard.get_mut(count..).and_then(<[u32]>::first_chunk_mut);
+            let room = supporting.get_mut(count..).and_then(<[u32]>::first_chunk_mut);
             if let (Some(balls), Some(room)) = (balls, room) {
-                count += balls.heard(simd, x, distance, group * id32(PointBlock::WIDTH), room);
+                count += balls.supporting(simd, x, distance, group * id32(PointBlock::WIDTH), room);
             }
         }
-        &mut heard[..count]
+        &mut supporting[..count]
     }
 
     /// Returns the sums over all points of `groups`, which must ascend, around x.
@@ -205,12 +205,12 @@ impl<'a> Index<'a> {
         simd: S,
         x: &Centre,
         groups: &[u32],
-        heard: &mut Vec<u32>,
+        supporting: &mut Vec<u32>,
         halves: &mut Vec<HalfBlock>,
     ) -> Moments {
         let mut near = Neighbourhood::new(simd, self.plan, x);
-        let heard = self.heard(simd, groups, x.rounded(), 0.0, heard);
-        near.offer_all(simd, self.blocks, heard, halves);
+        let supporting = self.supporting(simd, groups, x.rounded(), 0.0, supporting);
+        near.offer_all(simd, self.blocks, supporting, halves);
         near.moments(simd)
     }
 }
@@ -237,9 +237,12 @@ impl PlaceVisitor for Groups<'_> {
     #[inline(always)]
     fn most_sq_of<S: Simd>(&self, simd: S, siblings: &Siblings) -> f32x4<S> {
         let [a, b, c, d] = siblings.reach;
-        let horizon = |reach: f32| self.plan.horizon(reach);
-        let horizons = f32x4::load_array(simd, [horizon(a), horizon(b), horizon(c), horizon(d)]);
-        let far = (horizons + self.distance) * GROWN;
+        let support_radius = |reach: f32| self.plan.support_radius(reach);
+        let support_radii = f32x4::load_array(
+            simd,
+            [support_radius(a), support_radius(b), support_radius(c), support_radius(d)],
+        );
+        let far = (support_radii + self.distance) * GROWN;
         far * far
     }
 

@@ -75,13 +75,13 @@ impl PointKind {
     }
 }
 
-/// See [`crate::Slices::obstacle_reach`]; for points on a sheet.
+/// See [`crate::ScanArrays::obstacle_reach`]; for points on a sheet.
 #[inline]
 pub(crate) fn sheet_reach(radius: f32, disc: f32, reach: f32) -> f32 {
     cell_radius(radius, reach).max(disc * DISC_REACH)
 }
 
-/// See [`crate::Slices::cell_radius`].
+/// See [`crate::ScanArrays::cell_radius`].
 #[inline]
 pub(crate) fn cell_radius(radius: f32, reach: f32) -> f32 {
     radius.min(0.5 * reach)
@@ -99,7 +99,7 @@ const BALL_AMONG_OTHERS: f32 = 0.325;
 /// the centres of two touching balls are no further apart than the greater of their local radii.
 const BALL_OF_SPARSE: f32 = 0.5;
 
-/// See [`crate::Slices::obstacle_ball`].
+/// See [`crate::ScanArrays::obstacle_ball`].
 #[inline]
 pub(crate) fn obstacle_ball(i: usize, dense: usize, kind: PointKind, radius: f32) -> f32 {
     if is_on_sheet(i, dense, kind) { 0.0 } else { ball_share(kind) * radius }
@@ -110,13 +110,13 @@ pub(crate) const fn ball_share(kind: PointKind) -> f32 {
     if kind.is_sparse() { BALL_OF_SPARSE } else { BALL_AMONG_OTHERS }
 }
 
-/// See [`crate::Slices::is_on_sheet`].
+/// See [`crate::ScanArrays::is_on_sheet`].
 #[inline]
 pub(crate) fn is_on_sheet(i: usize, dense: usize, kind: PointKind) -> bool {
     i < dense && kind.is_sheet()
 }
 
-/// See [`crate::Slices::ball`].
+/// See [`crate::ScanArrays::ball`].
 #[inline]
 pub(crate) fn ball(kind: PointKind, radius: f32, sampling_radius: f32) -> f32 {
     if kind.is_sparse() { radius.min(sampling_radius) } else { 0.0 }

@@ -60,7 +60,7 @@ pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<Poi
             for k in 0..3 {
                 group.position[k][lane] = centre[k];
             }
-            group.horizon[lane] = radius;
+            group.support_radius[lane] = radius;
         }
         group
     });
@@ -70,28 +70,28 @@ pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<Poi
 /// Returns a ball that contains the support balls of all points of a block.
 #[inline(always)]
 fn ball<S: Simd>(simd: S, block: &PointBlock) -> ([f32; 3], f32) {
-    let PointBlock { position: [x, y, z], horizon, .. } = block;
+    let PointBlock { position: [x, y, z], support_radius, .. } = block;
     let (mut sum, mut count) = ([0.0; 3], 0.0);
     for i in 0..PointBlock::WIDTH {
-        if horizon[i] > 0.0 {
+        if support_radius[i] > 0.0 {
             (sum, count) = ([sum[0] + x[i], sum[1] + y[i], sum[2] + z[i]], count + 1.0);
         }
     }
     let mut centre = [sum[0] / count, sum[1] / count, sum[2] / count];
     // The smallest ball of balls: from the mean, ever smaller steps towards the point whose support
     // ball extends furthest.
-    let horizons = f32x16::load_array_ref(simd, horizon);
-    let is_there: mask32x16<S> = horizons.simd_gt(0.0);
+    let support_radii = f32x16::load_array_ref(simd, support_radius);
+    let is_there: mask32x16<S> = support_radii.simd_gt(0.0);
     let mut best = (centre, f32::INFINITY);
     for step in 2..2 + CENTRING {
         let d = seen_from(simd, &block.position, centre);
-        let heard = product(d, d).sqrt() + horizons;
-        let heard = simd.select_f32x16(is_there, heard, f32x16::splat(simd, 0.0));
-        let radius = greatest(heard, 0.0);
+        let outer = product(d, d).sqrt() + support_radii;
+        let outer = simd.select_f32x16(is_there, outer, f32x16::splat(simd, 0.0));
+        let radius = greatest(outer, 0.0);
         if radius < best.1 {
             best = (centre, radius);
         }
-        let furthest: mask32x16<S> = heard.simd_eq(radius);
+        let furthest: mask32x16<S> = outer.simd_eq(radius);
         let i = furthest.to_bitmask().trailing_zeros() as usize % PointBlock::WIDTH;
         let share = 1.0 / f32::from(step);
         for (c, p) in centre.iter_mut().zip([x[i], y[i], z[i]]) {
@@ -151,14 +151,14 @@ impl Locality {
         guess: f32,
     ) {
         let own = points.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d)).fold(0.0, f32::max).sqrt();
-        let mut half = 0.5 * index.plan.horizon(guess);
+        let mut half = 0.5 * index.plan.support_radius(guess);
         // A good guess saves a second descent.
         loop {
             self.within = (own + half) * GROWN;
             index.collect_by(simd, middle, self.within, &mut self.groups);
-            let count = index.heard(simd, &self.groups, middle, self.within, &mut self.blocks).len();
+            let count = index.supporting(simd, &self.groups, middle, self.within, &mut self.blocks).len();
             self.blocks.truncate(count);
-            self.reach = 0.5 * self.greatest_heard(index, middle, own * GROWN);
+            self.reach = 0.5 * self.greatest_support_radius(index, middle, own * GROWN);
             if self.reach <= half {
                 return;
             }
@@ -169,15 +169,15 @@ impl Locality {
     /// Returns the greatest support radius of the points whose support ball comes within `distance`
     /// of `x`.
     #[inline(always)]
-    fn greatest_heard(&self, index: &Index<'_>, x: [f32; 3], distance: f32) -> f32 {
+    fn greatest_support_radius(&self, index: &Index<'_>, x: [f32; 3], distance: f32) -> f32 {
         let mut greatest = [0.0_f32; PointBlock::WIDTH];
         for &block in &self.blocks {
-            let PointBlock { position: [px, py, pz], horizon, .. } = &index.blocks[block as usize];
+            let PointBlock { position: [px, py, pz], support_radius, .. } = &index.blocks[block as usize];
             for i in 0..PointBlock::WIDTH {
                 let d = [px[i] - x[0], py[i] - x[1], pz[i] - x[2]];
-                let far = (horizon[i] + distance) * GROWN;
-                let heard = if dot(d, d) < far * far { horizon[i] } else { 0.0 };
-                greatest[i] = if heard > greatest[i] { heard } else { greatest[i] };
+                let far = (support_radius[i] + distance) * GROWN;
+                let radius = if dot(d, d) < far * far { support_radius[i] } else { 0.0 };
+                greatest[i] = if radius > greatest[i] { radius } else { greatest[i] };
             }
         }
         greatest.into_iter().fold(0.0, f32::max)

@@ -113,18 +113,18 @@ pub(crate) fn spacings(
     let counted: &mut [u8] = &mut votes;
     let found = &*spacings;
     let vote = |blocks: Range<usize>| {
-        let (mut search, mut heard) = (Search::new(tree, points), Vec::new());
+        let (mut search, mut nearby) = (Search::new(tree, points), Vec::new());
         for block in blocks.filter(|&block| found[of_block(block)].iter().any(|s| s.look() != Look::Area)) {
             search.start(block);
             for i in of_block(block).filter(|&i| found[i].look() != Look::Area) {
                 search.look(i, neighbours);
-                heard.extend(search.near.iter().map(|&(_, j)| j));
+                nearby.extend(search.near.iter().map(|&(_, j)| j));
             }
         }
-        heard
+        nearby
     };
-    in_order(tree.blocks().len(), vote, |heard| {
-        for j in heard {
+    in_order(tree.blocks().len(), vote, |nearby| {
+        for j in nearby {
             counted[j] = counted[j].saturating_add(1);
         }
     });

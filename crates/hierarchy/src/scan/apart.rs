@@ -5,7 +5,7 @@ use nearmiss_geometry::NodeId;
 use crate::bounds::boxes::{OrientedBox, Relative};
 use crate::bounds::part::Part;
 use crate::patch::centres::Centres;
-use crate::scan::slices::Slices;
+use crate::scan::arrays::ScanArrays;
 use crate::tree::topology::NodePair;
 
 /// Bound on the rounding error of the distance of two positions, in units of [`Relative::slack`],
@@ -23,10 +23,10 @@ pub enum Extent {
 }
 
 /// Returns `true` if the coverings show that the contents of two nodes are further than `reach`
-/// apart. `motion` is the relative pose of `b` in the frame of `a`, in which `reach` is measured.
+/// apart. `relative` is the relative pose of `b` in the frame of `a`, in which `reach` is measured.
 ///
 /// As in the paper, balls further than that from the volume of the other node are dropped first.
-/// The volume is the box for discs, the [enclosure](Slices::enclosure) for the surface. Rounding is
+/// The volume is the box for discs, the [enclosure](ScanArrays::enclosure) for the surface. Rounding is
 /// included: excluded nodes have nothing within `reach` of each other. Each remaining ball of one
 /// node is compared with sixteen of the other at a time. Does not allocate.
 ///
@@ -34,21 +34,21 @@ pub enum Extent {
 /// If there are no such nodes.
 #[must_use]
 pub fn apart(
-    a: &Slices<'_>,
-    b: &Slices<'_>,
+    a: &ScanArrays<'_>,
+    b: &ScanArrays<'_>,
     pair: NodePair,
-    motion: &Relative,
+    relative: &Relative,
     reach: f32,
     extent: Extent,
 ) -> bool {
     let (node_a, node_b) = (pair.a.index(), pair.b.index());
     let (radius_a, bounds_a) = extent.of(a, pair.a);
     let (radius_b, bounds_b) = extent.of(b, pair.b);
-    let radius_b = radius_b * motion.scale();
-    let reach = reach + ROUNDINGS * motion.slack();
+    let radius_b = radius_b * relative.scale();
+    let reach = reach + ROUNDINGS * relative.slack();
     let of_a = a.samples(node_a).iter().map(|i| a.position(i));
-    let near_a = within(of_a, &motion.moved(&bounds_b), radius_a + reach);
-    let of_b = b.samples(node_b).iter().map(|i| motion.point(b.position(i)));
+    let near_a = within(of_a, &relative.moved(&bounds_b), radius_a + reach);
+    let of_b = b.samples(node_b).iter().map(|i| relative.point(b.position(i)));
     let near_b = within(of_b, &bounds_a, radius_b + reach);
     let least = radius_a + radius_b + reach;
     let (few, many) = if near_a.len() < near_b.len() { (&near_a, &near_b) } else { (&near_b, &near_a) };
@@ -58,11 +58,11 @@ pub fn apart(
 impl Extent {
     /// Returns the radius of a node's balls, and its volume.
     #[inline]
-    fn of(self, slices: &Slices<'_>, node: NodeId) -> (f32, OrientedBox) {
+    fn of(self, arrays: &ScanArrays<'_>, node: NodeId) -> (f32, OrientedBox) {
         match self {
-            Self::Discs => (slices.sampling_radius_of(node.index()), slices.tree.bounds(node)),
+            Self::Discs => (arrays.sampling_radius_of(node.index()), arrays.tree.bounds(node)),
             Self::Surface => {
-                (slices.covering_radius(node.index()), slices.tree.enclosure(Part::Surface, node))
+                (arrays.covering_radius(node.index()), arrays.tree.enclosure(Part::Surface, node))
             }
         }
     }

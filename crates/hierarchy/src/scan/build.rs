@@ -16,12 +16,12 @@ use crate::bounds::part::Part;
 use crate::point::disc::DiscRadii;
 use crate::point::kind::PointKind;
 use crate::point::leaf_block::{LeafBlock, LeafParts, Leaves};
+use crate::scan::arrays::ScanArrays;
 use crate::scan::data::{Arrays, HierarchyMeta};
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::outline::{Ball, Outline};
 use crate::scan::points::ScanPoints;
 use crate::scan::prepare::{Prepared, prepare};
-use crate::scan::slices::Slices;
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Tree, siblings};
 
@@ -70,8 +70,8 @@ impl PointHierarchy {
     /// Returns the arrays that a query reads.
     #[inline]
     #[must_use]
-    pub fn slices(&self) -> Slices<'_> {
-        Slices {
+    pub fn arrays(&self) -> ScanArrays<'_> {
+        ScanArrays {
             normals: &self.arrays.normals,
             radii: &self.arrays.radii,
             discs: self.discs(),
@@ -143,8 +143,8 @@ impl PointHierarchy {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     pub fn sheet_share(&self) -> f64 {
-        let slices = self.slices();
-        (0..self.len()).filter(|&i| slices.is_on_sheet(i)).count() as f64 / self.len() as f64
+        let arrays = self.arrays();
+        (0..self.len()).filter(|&i| arrays.is_on_sheet(i)).count() as f64 / self.len() as f64
     }
 
     /// Returns the definition of the surface, at the scale of the stored positions.
@@ -172,7 +172,7 @@ impl PointHierarchy {
     }
 
     /// Returns the positions in leaf order. A scan from a file unpacks them on first use, in O(n);
-    /// [`Slices::position`] reads a single position without that.
+    /// [`ScanArrays::position`] reads a single position without that.
     #[must_use]
     pub fn positions(&self) -> &[[f32; 3]] {
         self.positions.get_or_init(|| {
@@ -202,7 +202,7 @@ impl PointHierarchy {
     /// # Panics
     /// If `oriented` does not have one normal for each point.
     pub fn turn_normals(&mut self, oriented: &[[f32; 3]]) {
-        assert_eq!(oriented.len(), self.len(), "a normal a point");
+        assert_eq!(oriented.len(), self.len(), "expected a normal for each point");
         for (normal, to) in self.arrays.normals.to_mut().iter_mut().zip(oriented) {
             if dot(*normal, *to) < 0.0 {
                 *normal = normal.map(|c| -c);
@@ -249,19 +249,19 @@ impl PointHierarchy {
 
     /// Computes the hash that identifies this scan, and its bounding balls.
     pub(crate) fn outlined(&self) -> Outline {
-        let slices = self.slices();
+        let arrays = self.arrays();
         let mut hash = Xxh3::new();
         let frame = self.frame();
         hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
         hash.update(bytes_of(&[self.meta.leaf_size, self.meta.samples, self.meta.dense]));
-        hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
+        hash.update(bytes_of(&[arrays.sampling_radius, arrays.reach]));
         hash.update(bytemuck::cast_slice(self.positions()));
-        hash.update(bytemuck::cast_slice(slices.discs.codes));
-        hash.update(bytemuck::cast_slice(slices.radii));
+        hash.update(bytemuck::cast_slice(arrays.discs.codes));
+        hash.update(bytemuck::cast_slice(arrays.radii));
         Outline {
             identity: hash.digest(),
-            surface: Ball::about(&slices.enclosure(0)),
-            obstacle: Ball::about(&slices.obstacle_enclosure(0)),
+            surface: Ball::about(&arrays.enclosure(0)),
+            obstacle: Ball::about(&arrays.obstacle_enclosure(0)),
             discs: Ball::about(&self.meta.root.bounds),
         }
     }
@@ -356,7 +356,7 @@ impl PointHierarchy {
         &self.topology
     }
 
-    /// Returns the box of each node around the discs and [balls](Slices::ball) of its points, in
+    /// Returns the box of each node around the discs and [balls](ScanArrays::ball) of its points, in
     /// the order of the nodes' ids.
     #[must_use]
     pub fn boxes(&self) -> impl ExactSizeIterator<Item = OrientedBox> {

@@ -55,7 +55,7 @@ impl PointHierarchy {
                 let (block, lane) = (&blocks[i / PointBlock::WIDTH], i % PointBlock::WIDTH);
                 let d = [0, 1, 2].map(|k| f64::from(block.position[k][lane]) - x[k]);
                 let t = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-                    * f64::from(self.plan.decay(block.horizon[lane]));
+                    * f64::from(self.plan.decay(block.support_radius[lane]));
                 if t < f64::from(self.plan.reach_sq()) {
                     #[expect(clippy::cast_possible_truncation, reason = "weights are single precision")]
                     let w = f64::from(self.plan.kernel().weight(t as f32));

@@ -22,7 +22,9 @@ pub enum IntakeError {
     #[error(transparent)]
     Work(#[from] WorkError),
     /// The number of points differs from the first pass.
-    #[error("expected {counted} points, got {got}; the input changed while it was read: read it again")]
+    #[error(
+        "expected {counted} points as in the first pass, got {got}; leave the input unchanged and read it again"
+    )]
     Changed {
         /// The number of points in the first pass.
         counted: usize,

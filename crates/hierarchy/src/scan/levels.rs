@@ -8,10 +8,10 @@ use nearmiss_surface::{Evaluation, Moments};
 
 use crate::patch::samples::{NodeSamples, samples};
 use crate::point::gather::GatherScratch;
+use crate::scan::arrays::ScanArrays;
 use crate::scan::build::PointHierarchy;
-use crate::scan::slices::Slices;
 
-impl<'a> Slices<'a> {
+impl<'a> ScanArrays<'a> {
     /// Returns the sample P' of a node: [`BuildOptions::samples`](crate::BuildOptions::samples) of
     /// its points, or all if it is a leaf or has no more.
     ///
@@ -52,12 +52,12 @@ impl<'a> Slices<'a> {
     /// # Panics
     /// If there is no such node.
     #[must_use]
-    pub fn node_horizon(&self, node: usize) -> f32 {
-        self.plan.horizon(self.coverings[node].spacing) * self.thinning(node)
+    pub fn node_support_radius(&self, node: usize) -> f32 {
+        self.plan.support_radius(self.coverings[node].spacing) * self.thinning(node)
     }
 
     /// Returns the bandwidth of a node's samples, by eq. 9 of Klein & Zachmann 2004 with r(P') by
-    /// eq. 10; see [`Self::node_horizon`].
+    /// eq. 10; see [`Self::node_support_radius`].
     ///
     /// # Panics
     /// If there is no such node.
@@ -76,21 +76,21 @@ impl<'a> Slices<'a> {
 
 impl PointHierarchy {
     /// Evaluates f' of a node at `x`, in the stored frame: f over the node's samples, each with the
-    /// node's [bandwidth](Slices::node_bandwidth) (Klein & Zachmann 2004, §5.5). Costs about as
+    /// node's [bandwidth](ScanArrays::node_bandwidth) (Klein & Zachmann 2004, §5.5). Costs about as
     /// much as f.
     ///
     /// # Panics
     /// If there is no such node.
     pub fn evaluate_node_with(&self, node: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        let slices = self.slices();
-        let (samples, horizon) = (slices.samples(node), slices.node_horizon(node));
+        let arrays = self.arrays();
+        let (samples, support_radius) = (arrays.samples(node), arrays.node_support_radius(node));
         let mut samples = samples.iter();
         let blocks = std::iter::from_fn(|| {
             let mut block = PointBlock::EMPTY;
             for (lane, i) in samples.by_ref().take(PointBlock::WIDTH).enumerate() {
-                self.plan().put(&mut block, lane, slices.position(i), horizon);
+                self.plan().put(&mut block, lane, arrays.position(i), support_radius);
             }
-            (block.horizon[0] > 0.0).then_some(block)
+            (block.support_radius[0] > 0.0).then_some(block)
         });
         Moments::about(scratch.level, self.plan(), x, blocks).evaluate(self.plan(), x)
     }

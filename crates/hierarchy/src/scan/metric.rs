@@ -49,11 +49,11 @@ impl PointHierarchy {
         let leaves: Vec<Range<usize>> =
             (0..topology.leaves()).map(|leaf| topology.points_of_leaf(leaf)).collect();
         let surfels = chunks(&leaves, |leaves| {
-            let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
+            let (mut scratch, mut supporting, mut near) = (S::default(), Vec::new(), Vec::new());
             let surfel = |i: usize| {
-                heard.clear();
-                let at = fit(id32(i), &mut scratch, &mut heard);
-                self.gather(&heard, &mut near);
+                supporting.clear();
+                let at = fit(id32(i), &mut scratch, &mut supporting);
+                self.gather(&supporting, &mut near);
                 self.surfel(i, &at, &near)
             };
             leaves.iter().cloned().flatten().map(surfel).collect::<Vec<_>>()
@@ -65,11 +65,11 @@ impl PointHierarchy {
         let corrected: Vec<usize> =
             (0..fits.len()).filter(|&i| fits[i].kind() != surfels[i].code.kind()).collect();
         let discs = chunks(&corrected, |points| {
-            let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
+            let (mut scratch, mut supporting, mut near) = (S::default(), Vec::new(), Vec::new());
             let surfel = |&i: &usize| {
-                heard.clear();
-                fit(id32(i), &mut scratch, &mut heard);
-                self.gather(&heard, &mut near);
+                supporting.clear();
+                fit(id32(i), &mut scratch, &mut supporting);
+                self.gather(&supporting, &mut near);
                 let fit = Fit::new(self.on_its_side(i, fits[i].normal), fits[i].kind());
                 surfel_of(&fit, self.positions()[i], &near)
             };
@@ -88,8 +88,8 @@ impl PointHierarchy {
         for points in points.chunks(PointBlock::WIDTH) {
             let mut block = PointBlock::EMPTY;
             for (lane, &i) in points.iter().enumerate() {
-                let horizon = self.plan.horizon(self.arrays.radii[i as usize]);
-                self.plan.put(&mut block, lane, self.positions()[i as usize], horizon);
+                let support_radius = self.plan.support_radius(self.arrays.radii[i as usize]);
+                self.plan.put(&mut block, lane, self.positions()[i as usize], support_radius);
             }
             blocks.push(block);
         }

@@ -154,7 +154,7 @@ impl PointHierarchy {
         for &group in listed {
             let balls = self.arrays.groups.get(group as usize)?;
             let d = seen_from(simd, &balls.position, nearest.rounded);
-            let reach = f32x16::load_array_ref(simd, &balls.horizon) + nearest.within;
+            let reach = f32x16::load_array_ref(simd, &balls.support_radius) + nearest.within;
             let near: mask32x16<S> = product(d, d).simd_le(reach * reach * GROWN);
             let first = group as usize * PointBlock::WIDTH;
             let mut left = bits(near) & lanes_of(group as usize, &(0..self.arrays.blocks.len()));

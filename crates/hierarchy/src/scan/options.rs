@@ -111,21 +111,21 @@ pub enum BuildError {
     #[error(transparent)]
     Surface(#[from] SurfaceError),
     /// The leaf size is out of range.
-    #[error("leaves of {0} points; 4 to 64 are possible")]
+    #[error("expected leaves of 4 to 64 points, got {0}")]
     LeafSize(u32),
     /// The number of neighbours for local radii is out of range.
-    #[error("a local radius from {0} neighbours; 3 to 32 are possible")]
+    #[error("expected 3 to 32 neighbours for local radii, got {0}")]
     RadiusNeighbours(u32),
     /// The number of samples of a node is out of range.
-    #[error("{0} samples of a node; 8 to 32 are possible")]
+    #[error("expected 8 to 32 samples of a node, got {0}")]
     Samples(u32),
     /// The reach is not positive and finite, or vanishes beside the scan's extent.
-    #[error("reach must be positive, finite and no less than the rounding of positions, got {0}")]
+    #[error("expected a finite reach above 0 and above the rounding error of positions, got {0}")]
     Reach(f64),
     /// The workspace failed.
     #[error(transparent)]
     Work(#[from] WorkError),
     /// The threads could not be started.
-    #[error("cannot start {0} threads")]
+    #[error("cannot start {0} threads; use fewer")]
     Threads(usize),
 }

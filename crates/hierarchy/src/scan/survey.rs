@@ -81,9 +81,9 @@ impl PointHierarchy {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts")]
     pub fn survey(&self, seed: u64) -> SamplingSurvey {
-        let slices = self.slices();
+        let arrays = self.arrays();
         let mut survey = SamplingSurvey::default();
-        let parts = [(0..slices.dense, BLOCKS), (slices.dense..self.len(), BLOCKS / 2)];
+        let parts = [(0..arrays.dense, BLOCKS), (arrays.dense..self.len(), BLOCKS / 2)];
         for (points, most) in parts {
             if points.is_empty() {
                 continue;
@@ -112,7 +112,7 @@ impl PointHierarchy {
 
     /// Surveys the points of a block that are among `points`.
     fn look(&self, block: usize, points: &Range<usize>) -> Seen {
-        let slices = self.slices();
+        let arrays = self.arrays();
         let mut ring = Ring::of(self);
         let mut seen = Seen::default();
         let first = block * WIDTH;
@@ -121,10 +121,10 @@ impl PointHierarchy {
             let near = ring.near.get(RANK.min(ring.count) - 1);
             let spacing = near.map_or(0.0, |(distance_sq, _)| f64::from(*distance_sq).sqrt());
             seen.count += 1;
-            let is_outlier = i >= slices.dense && spacing > f64::from(slices.reach) && {
+            let is_outlier = i >= arrays.dense && spacing > f64::from(arrays.reach) && {
                 let near = ring.ids().take(RANK);
                 // The radii of other points are limited by the reach.
-                let is_denser = |j: usize| j < slices.dense && DENSER * f64::from(slices.radii[j]) < spacing;
+                let is_denser = |j: usize| j < arrays.dense && DENSER * f64::from(arrays.radii[j]) < spacing;
                 let denser = near.filter(|&j| is_denser(j));
                 denser.count() >= OUTLIER
             };
@@ -133,7 +133,7 @@ impl PointHierarchy {
             } else {
                 seen.spacings.push(spacing * self.frame().scale);
             }
-            if slices.is_on_sheet(i)
+            if arrays.is_on_sheet(i)
                 && let Some(outward) = self.outward(i, ring.ids())
             {
                 seen.border += 1;
@@ -178,21 +178,21 @@ impl PointHierarchy {
     /// Returns the width of the hole that point `i` faces `outward`, in stored units, if it is
     /// wider than the reach and another part of the same plane is beyond it.
     fn hole(&self, i: usize, outward: Vector3<f64>) -> Option<f64> {
-        let slices = self.slices();
+        let arrays = self.arrays();
         let (p, normal) = (self.place(i), self.normal(i));
-        let reach = f64::from(slices.reach);
+        let reach = f64::from(arrays.reach);
         let (mut best, mut far_side) = (FAR * reach, None);
         let mut open = vec![NodeId::ROOT];
-        let topology = slices.tree.topology;
+        let topology = arrays.tree.topology;
         while let Some(id) = open.pop() {
-            let (points, bounds) = (topology.points(id), slices.tree.bounds(id));
+            let (points, bounds) = (topology.points(id), arrays.tree.bounds(id));
             let radius = f64::from(bounds.radius());
             let d = Vector3::from(bounds.centre.map(f64::from)) - p;
             let along = outward.dot(&d);
             // A sphere misses the cone if it does so in the plane through the axis and its centre.
             let beside = (d.norm_squared() - along * along).max(0.0).sqrt();
             let sine = (1.0 - CONE * CONE).sqrt();
-            if points.start >= slices.dense
+            if points.start >= arrays.dense
                 || d.norm() - radius > best
                 || beside * CONE - along * sine > radius
             {
@@ -202,7 +202,7 @@ impl PointHierarchy {
                 open.extend(topology.children(id).iter());
                 continue;
             }
-            for j in points.start..points.end.min(slices.dense) {
+            for j in points.start..points.end.min(arrays.dense) {
                 let d = self.place(j) - p;
                 let width = d.norm();
                 if width < best && width > 0.0 && outward.dot(&d) > CONE * width {

@@ -19,13 +19,13 @@ fn moved(pose: &Pose, b: &OrientedBox) -> Solid {
 
 /// Returns the balls of a node in a pose (centres and radius), and its volume.
 fn covering(scan: &PointHierarchy, node: usize, pose: &Pose, extent: Extent) -> (Vec<[f64; 3]>, f64, Solid) {
-    let slices = scan.slices();
-    let centres = slices.samples(node).iter().map(|i| pose.apply(slices.position(i).map(f64::from)));
+    let arrays = scan.arrays();
+    let centres = arrays.samples(node).iter().map(|i| pose.apply(arrays.position(i).map(f64::from)));
     let (radius, volume) = match extent {
         Extent::Discs => {
-            (slices.sampling_radius_of(node), slices.tree.bounds(NodeId(u32::try_from(node).unwrap())))
+            (arrays.sampling_radius_of(node), arrays.tree.bounds(NodeId(u32::try_from(node).unwrap())))
         }
-        Extent::Surface => (slices.covering_radius(node), slices.enclosure(node)),
+        Extent::Surface => (arrays.covering_radius(node), arrays.enclosure(node)),
     };
     (centres.collect(), pose.scale() * f64::from(radius), moved(pose, &volume))
 }
@@ -33,7 +33,7 @@ fn covering(scan: &PointHierarchy, node: usize, pose: &Pose, extent: Extent) -> 
 /// Returns the number of node pairs, of excluded ones, and of those that only the naive
 /// implementation excludes.
 fn compare(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose, reach: f64, extent: Extent) -> [u32; 3] {
-    let motion = Relative::new(pose, 10.0);
+    let relative = Relative::new(pose, 10.0);
     let id = |k: usize| NodeId(u32::try_from(k).unwrap());
     let mut counts = [0; 3];
     for i in 0..a.topology().len() {
@@ -43,7 +43,7 @@ fn compare(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose, reach: f64, exte
             let clear = clearance((&centres_a, radius_a, &volume_a), (&centres_b, radius_b, &volume_b));
             let pair = NodePair { a: id(i), b: id(j) };
             #[expect(clippy::cast_possible_truncation, reason = "a reach")]
-            let found = apart(&a.slices(), &b.slices(), pair, &motion, reach as f32, extent);
+            let found = apart(&a.arrays(), &b.arrays(), pair, &relative, reach as f32, extent);
             assert!(!found || clear > reach, "{i} and {j} are excluded at {clear}");
             counts[0] += 1;
             counts[1] += u32::from(found);

@@ -36,14 +36,14 @@ fn id(node: usize) -> NodeId {
 
 /// Returns the samples of a node, in double precision.
 fn centres(scan: &PointHierarchy, node: usize) -> Vec<[f64; 3]> {
-    scan.slices().samples(node).iter().map(|i| scan.positions()[i].map(f64::from)).collect()
+    scan.arrays().samples(node).iter().map(|i| scan.positions()[i].map(f64::from)).collect()
 }
 
 /// Returns the enclosures of the leaves under a node.
 fn leaves(scan: &PointHierarchy, node: usize) -> Vec<Solid> {
     let topology = scan.topology();
     let under = topology.leaves_under(id(node));
-    under.map(|leaf| solid(&scan.slices().enclosure(topology.leaf(leaf).index()))).collect()
+    under.map(|leaf| solid(&scan.arrays().enclosure(topology.leaf(leaf).index()))).collect()
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn samples_are_distinct_points_of_their_node() {
     for (kind, scan) in scans(600) {
         for node in scan.topology().ids() {
             let (id, points) = (node.index(), scan.topology().points(node));
-            let samples: Vec<usize> = scan.slices().samples(id).iter().collect();
+            let samples: Vec<usize> = scan.arrays().samples(id).iter().collect();
             let most = scan.samples_a_node() as usize;
             let all = scan.topology().is_leaf(node) || points.len() <= most;
             assert_eq!(samples.len(), if all { points.len() } else { most }, "{kind:?}, node {id}");
@@ -86,9 +86,9 @@ fn coverings_contain_what_is_ok_and_are_no_larger_than_boxes_ask_for() {
         }
         for id in 0..scan.topology().len() {
             let [_, high] = covering_radius(&centres(&scan, id), &leaves(&scan, id), 1);
-            let radius = f64::from(scan.slices().covering_radius(id));
+            let radius = f64::from(scan.arrays().covering_radius(id));
             assert!(radius <= 1.001 * high + 1e-18, "{kind:?}, node {id}: {radius}, but {high} suffice");
-            assert!(radius >= f64::from(scan.slices().sampling_radius_of(id)), "{kind:?}, node {id}");
+            assert!(radius >= f64::from(scan.arrays().sampling_radius_of(id)), "{kind:?}, node {id}");
             nodes += 1;
             share += radius / high;
         }
@@ -104,7 +104,7 @@ fn check_covered(kind: CloudKind, scan: &PointHierarchy, x: [f64; 3]) {
     let p = (0..scan.len()).find(|&p| to_nearest(&positions[p..=p], x) <= nearest).unwrap();
     let topology = scan.topology();
     for id in topology.ids().filter(|&id| topology.points(id).contains(&p)).map(NodeId::index) {
-        let beyond = to_nearest(&centres(scan, id), x) / f64::from(scan.slices().covering_radius(id));
+        let beyond = to_nearest(&centres(scan, id), x) / f64::from(scan.arrays().covering_radius(id));
         assert!(beyond <= 1.0, "{kind:?}: {x:?} is {beyond} radii from node {id}");
     }
 }
@@ -147,11 +147,11 @@ fn sampling_radii_equal_the_twin() {
         };
         for id in 0..scan.topology().len() {
             let centres = centres(&scan, id);
-            let found = f64::from(scan.slices().sampling_radius_of(id));
+            let found = f64::from(scan.arrays().sampling_radius_of(id));
             let (mut low, mut high) = (0.0_f64, 0.0_f64);
             for i in scan.topology().points(self::id(id)) {
-                let slices = scan.slices();
-                let ball = f64::from(slices.ball(i).max(slices.obstacle_ball(i)));
+                let arrays = scan.arrays();
+                let ball = f64::from(arrays.ball(i).max(arrays.obstacle_ball(i)));
                 let disc = f64::from(scan.discs().get(i));
                 let about = to_nearest(&centres, scan.positions()[i].map(f64::from)) + ball;
                 low = low.max(radius_of(i, &centres, disc, 0.0)).max(about);

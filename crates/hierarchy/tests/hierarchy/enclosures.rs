@@ -86,9 +86,9 @@ fn flat_grid(axis: usize, n: i32) -> Vec<[f64; 3]> {
 fn all_that_is_ok_is_enclosed() {
     let options = [
         SurfaceOptions::default(),
-        SurfaceOptions::default().with_kernel(Kernel::Wendland).with_horizon(4.0),
+        SurfaceOptions::default().with_kernel(Kernel::Wendland).with_support_radius(4.0),
         SurfaceOptions::default().with_bandwidth(Bandwidth::Global).with_support_min(3),
-        SurfaceOptions::default().with_horizon(2.0).with_threshold(0.1).with_support_min(3),
+        SurfaceOptions::default().with_support_radius(2.0).with_threshold(0.1).with_support_min(3),
     ];
     let grids = [0, 1, 2].map(|axis| flat_grid(axis, 8));
     let clouds = CloudKind::ALL.map(|kind| arbitrary::cloud(kind, 250, 6));
@@ -131,7 +131,7 @@ fn surface_points_are_in_every_enclosure_of_their_nearest_point() {
         SurfaceOptions::default(),
         SurfaceOptions::default().with_kernel(Kernel::Wendland),
         SurfaceOptions::default().with_bandwidth(Bandwidth::Global),
-        SurfaceOptions::default().with_horizon(5.0).with_threshold(1e-2),
+        SurfaceOptions::default().with_support_radius(5.0).with_threshold(1e-2),
     ];
     let mut found = 0;
     for kind in CloudKind::ALL {

@@ -79,7 +79,7 @@ fn blobs_wires_and_lone_points_are_named() {
     let scan = prepared(&points);
     let lone = scan.source().iter().position(|&s| s == 1600).unwrap();
     assert_eq!(scan.kind(lone), PointKind::Stray);
-    let ball = scan.slices().ball(lone);
+    let ball = scan.arrays().ball(lone);
     assert!(scan.discs().get(lone) <= ball && f64::from(ball) <= scan.sampling_radius(), "{ball}");
     assert!(scan.share(PointKind::Stray) < 0.002, "no other");
 }
@@ -96,7 +96,7 @@ fn nothing_is_interpolated_beyond_the_reach() {
         let is_far = scan.source()[i] >= 4900;
         assert_eq!(scan.kind(i).is_sparse(), is_far, "point {i}: {:?}", scan.kind(i));
         let [radius, disc] = [scan.radii()[i], scan.discs().get(i)].map(|x| f64::from(x) * scale);
-        let ball = f64::from(scan.slices().obstacle_ball(i)) * scale;
+        let ball = f64::from(scan.arrays().obstacle_ball(i)) * scale;
         let limit = reach * (1.0 + 1e-6);
         assert!(radius <= limit && disc <= 0.5 * limit && ball <= 0.5 * limit, "point {i}");
         if is_far {

@@ -17,25 +17,28 @@ fn f_of_a_node_equals_the_twin_over_its_samples() {
             let scan = PointHierarchy::build(&cloud, &options).unwrap();
             let (mut scratch, mut random) = (GatherScratch::default(), arbitrary::rng(8));
             for id in (0..scan.topology().len()).step_by(3) {
-                let slices = scan.slices();
+                let arrays = scan.arrays();
                 let points = scan.topology().points(NodeId(u32::try_from(id).unwrap()));
                 let count = points.len() as f64;
-                let samples: Vec<usize> = slices.samples(id).iter().collect();
+                let samples: Vec<usize> = arrays.samples(id).iter().collect();
                 // Eq. 10 and 9 of Klein & Zachmann 2004.
                 let thinning = (count / samples.len() as f64).sqrt();
-                let squares = slices.radii[points].iter().map(|&r| f64::from(r).powi(2)).sum::<f64>();
+                let squares = arrays.radii[points].iter().map(|&r| f64::from(r).powi(2)).sum::<f64>();
                 let reach = match kernel {
                     Kernel::Wendland => 7.2_f64.sqrt(),
                     _ => (-(1e-4_f64).ln()).sqrt(),
                 };
                 let h = thinning
                     * match bandwidth {
-                        Bandwidth::Global => 3.0 * f64::from(slices.sampling_radius) / reach,
+                        Bandwidth::Global => 3.0 * f64::from(arrays.sampling_radius) / reach,
                         Bandwidth::Fixed(h) => h,
                         _ => 3.0 * (squares / count).sqrt() / reach,
                     };
-                assert!((f64::from(slices.node_bandwidth(id)) / h - 1.0).abs() < 1e-5, "node {id}: {h}");
-                assert!((f64::from(slices.node_horizon(id)) / (h * reach) - 1.0).abs() < 1e-5, "node {id}");
+                assert!((f64::from(arrays.node_bandwidth(id)) / h - 1.0).abs() < 1e-5, "node {id}: {h}");
+                assert!(
+                    (f64::from(arrays.node_support_radius(id)) / (h * reach) - 1.0).abs() < 1e-5,
+                    "node {id}"
+                );
                 let points: Vec<[f64; 3]> =
                     samples.iter().map(|&i| scan.positions()[i].map(f64::from)).collect();
                 let kernel = match kernel {

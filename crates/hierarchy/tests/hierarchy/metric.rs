@@ -16,13 +16,18 @@ fn clouds() -> Vec<Vec<[f64; 3]>> {
     clouds
 }
 
-/// Returns f by straight distances, and adds all points that support it to `heard`.
-fn straight(scan: &PointHierarchy, i: u32, scratch: &mut GatherScratch, heard: &mut Vec<u32>) -> Evaluation {
+/// Returns f by straight distances, and adds all points that support it to `supporting`.
+fn straight(
+    scan: &PointHierarchy,
+    i: u32,
+    scratch: &mut GatherScratch,
+    supporting: &mut Vec<u32>,
+) -> Evaluation {
     let p = scan.positions()[i as usize];
     for (j, (q, &radius)) in (0..).zip(scan.positions().iter().zip(scan.radii())) {
         let d_sq: f64 = (0..3).map(|k| (f64::from(q[k]) - f64::from(p[k])).powi(2)).sum();
-        if d_sq < f64::from(scan.plan().horizon(radius)).powi(2) {
-            heard.push(j);
+        if d_sq < f64::from(scan.plan().support_radius(radius)).powi(2) {
+            supporting.push(j);
         }
     }
     scan.evaluate_near(i as usize, p.map(f64::from), scratch)
@@ -34,7 +39,7 @@ fn a_fit_by_straight_distances_changes_nothing() {
     for points in clouds() {
         let scan = prepared(&points);
         let mut again = scan.clone();
-        again.use_metric(Metric::Euclidean, |i, scratch, heard| straight(&scan, i, scratch, heard));
+        again.use_metric(Metric::Euclidean, |i, scratch, supporting| straight(&scan, i, scratch, supporting));
         assert_eq!(again.sanity_check(), Ok(()), "an invariant");
         assert_eq!(again.meta(), scan.meta(), "metadata");
         // Planes are fitted before the last tree is built, so sums have another order.
@@ -58,14 +63,14 @@ fn a_fit_by_straight_distances_changes_nothing() {
         }
         let boxes = [&again, &scan].map(|scan| scan.boxes().collect::<Vec<_>>());
         for id in 0..scan.topology().len() {
-            let [e, f] = [&again, &scan].map(|scan| scan.slices().enclosure(id));
+            let [e, f] = [&again, &scan].map(|scan| scan.arrays().enclosure(id));
             let [b, c] = [boxes[0][id], boxes[1][id]];
             for k in 0..3 {
                 let same =
                     near(b.half[k], c.half[k]) && (e.half[k] - f.half[k]).abs() < 0.01 * f.half[k].max(0.1);
                 assert!(same && near(b.centre[k], c.centre[k]), "node {id}: {b:?}, {c:?}");
             }
-            let [new, old] = [&again, &scan].map(|scan| scan.slices().sampling_radius_of(id));
+            let [new, old] = [&again, &scan].map(|scan| scan.arrays().sampling_radius_of(id));
             assert!((new - old).abs() < 1e-3 * old, "the sampling radius of node {id}");
         }
     }
@@ -83,9 +88,9 @@ fn what_a_fit_says_is_kept() {
     let statuses = [Status::Ok, Status::Border, Status::Ambiguous, Status::Outside];
     let [upright, tilted] = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]];
     let oriented = scan.clone();
-    scan.use_metric(Metric::Geodesic, |i, _: &mut (), heard| {
+    scan.use_metric(Metric::Geodesic, |i, _: &mut (), supporting| {
         // Points that only support themselves are at a border.
-        heard.push(i);
+        supporting.push(i);
         Evaluation {
             f: 0.0,
             normal: if i % 3 == 0 { tilted } else { upright },

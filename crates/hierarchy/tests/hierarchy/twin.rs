@@ -148,7 +148,7 @@ fn the_implicit_function_equals_the_twin() {
                 let surface = SurfaceOptions::default().with_kernel(kernel).with_bandwidth(bandwidth);
                 let scan = prepared(&points, &BuildOptions::default().with_surface(surface));
                 let parameters = Parameters {
-                    reach: surface.horizon,
+                    reach: surface.support_radius,
                     kernel: twin_kernel,
                     bandwidth: twin_bandwidth,
                     least_support: surface.support_min as usize,
@@ -228,9 +228,9 @@ fn a_list_is_complete_where_it_is_said_to_be() {
             let middle = scan.groups()[block / PointBlock::WIDTH].position.map(|c| f64::from(c[lane]));
             for (j, (p, r)) in scan.positions().iter().zip(scan.radii()).enumerate() {
                 let away = (0..3).map(|k| (f64::from(p[k]) - middle[k]).powi(2)).sum::<f64>().sqrt();
-                if away < f64::from(scan.plan().horizon(*r)) + f64::from(within) {
+                if away < f64::from(scan.plan().support_radius(*r)) + f64::from(within) {
                     let group = u32::try_from(j / PointBlock::WIDTH.pow(2)).unwrap();
-                    assert!(groups.contains(&group), "{kind:?}: point {j} is heard near block {block}");
+                    assert!(groups.contains(&group), "{kind:?}: point {j} supports f near block {block}");
                 }
             }
         }

@@ -205,6 +205,6 @@ impl BlockGrid {
         let edge = 1.0 / self.per_cell;
         let side = |k: usize, beyond: f64| (self.min[k] + edge * (cell[k] as f64 + beyond)) as f32;
         let (min, max) = ([0, 1, 2].map(|k| side(k, 0.0)), [0, 1, 2].map(|k| side(k, 1.0)));
-        (Bounds { min, max, horizon: 0.0 }, (MARGIN * edge) as f32)
+        (Bounds { min, max, support_radius: 0.0 }, (MARGIN * edge) as f32)
     }
 }

@@ -38,7 +38,7 @@ impl<'a> BlockTree<'a> {
         height: impl Fn(usize) -> f32,
         slope: f32,
     ) -> Cones<'a> {
-        assert_eq!(tips.len(), self.blocks.len(), "tips a block");
+        assert_eq!(tips.len(), self.blocks.len(), "expected tips for each block");
         for (block, tips) in tips.iter_mut().enumerate() {
             *tips = [f32::INFINITY; WIDTH];
             let points = block * WIDTH..block * WIDTH + self.count(block);

@@ -269,7 +269,7 @@ mod tests {
             // Points that follow each other are mostly close.
             points.sort_unstable_by(|p, q| p[0].total_cmp(&q[0]));
             let size = points.iter().flatten().fold(0.0, |far: f64, c| far.max(f64::from(c.abs())));
-            let blocks: Vec<PointBlock> = PointBlock::silent(&points).collect();
+            let blocks: Vec<PointBlock> = PointBlock::without_support(&points).collect();
             let boxes = BlockBoxes::new(&blocks, points.len());
             let tree = boxes.over(&blocks);
             let cells = tree.cells(Level::new());

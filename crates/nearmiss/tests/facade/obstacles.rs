@@ -28,14 +28,14 @@ fn how_far(a: &Placed<'_>, b: &Placed<'_>) -> Distance {
 /// ball that contains its part of the obstacle. Computed only from the definition in
 /// `docs/theory/obstacle.md`.
 fn matter(view: &Placed<'_>) -> Vec<([f64; 3], f64, f64)> {
-    let (slices, scale) = (view.scan().slices(), view.placed().scale());
+    let (arrays, scale) = (view.scan().arrays(), view.stored_to_world().scale());
     let part = |i: usize| {
-        let (radius, reach) = (f64::from(slices.radii[i]), f64::from(slices.reach));
+        let (radius, reach) = (f64::from(arrays.radii[i]), f64::from(arrays.reach));
         let kind = view.scan().kind(i);
         let alone = matches!(kind, PointKind::Line | PointKind::Stray | PointKind::Sparse);
-        let on_sheet = i < slices.dense && matches!(kind, PointKind::Sheet | PointKind::Edge);
+        let on_sheet = i < arrays.dense && matches!(kind, PointKind::Sheet | PointKind::Edge);
         let (ball, within) = if on_sheet {
-            (0.0, radius.min(0.5 * reach).max(1.05 * f64::from(slices.discs.get(i))))
+            (0.0, radius.min(0.5 * reach).max(1.05 * f64::from(arrays.discs.get(i))))
         } else {
             let ball = radius * if alone { 0.5 } else { 0.325 };
             (ball, ball)
@@ -132,8 +132,9 @@ fn answers_hold_against_brute_force() {
                     }
                     Verdict::Undecided(reason) => panic!("obstacles leave nothing open: {reason:?}"),
                 }
-                let most =
-                    views.iter().map(|v| v.scan().reach() / v.scan().frame().scale * v.placed().scale());
+                let most = views
+                    .iter()
+                    .map(|v| v.scan().reach() / v.scan().frame().scale * v.stored_to_world().scale());
                 let most = most.fold(0.0, f64::max);
                 assert!(answer.band > 0.0 && answer.band <= most * (1.0 + 1e-6), "{} of {most}", answer.band);
 

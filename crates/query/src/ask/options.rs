@@ -261,50 +261,51 @@ impl CollideOptions {
 #[non_exhaustive]
 pub enum PlanError {
     /// The radius is negative, infinite or NaN.
-    #[error("a radius of {0} about the points; it must be finite and not negative")]
+    #[error("expected a finite radius of at least 0 about the points, got {0}")]
     Radius(f64),
     /// The margin is negative, infinite or NaN.
-    #[error("a margin of {0}; it must be finite and not negative")]
+    #[error("expected a finite margin of at least 0, got {0}")]
     Margin(f64),
     /// The link length is negative, infinite or NaN.
-    #[error("link must be a finite length, zero or more, got {0}")]
+    #[error("expected a finite link length of at least 0, got {0}")]
     Link(f64),
     /// The relative precision is out of range.
-    #[error("relative must be at least 0 and less than 1, got {0}")]
+    #[error("expected a relative precision of at least 0 and below 1, got {0}")]
     Relative(f64),
     /// Too few or too many test points.
-    #[error("{0} test points; 1 to 65536 are possible")]
+    #[error("expected 1 to 65536 test points, got {0}")]
     TestPoints(u32),
     /// The tolerance is out of range.
-    #[error("a tolerance of {0} sampling radii; it must be more than 0 and at most 4")]
+    #[error("expected a tolerance above 0 and at most 4 sampling radii, got {0}")]
     Tolerance(f64),
     /// Too few or too many surfels.
-    #[error("{0} surfels; 1 to 65536 are possible, or 1 to 1024 sampling radii for each")]
+    #[error("expected 1 to 65536 surfels, or a surfel size of 1 to 1024 sampling radii, got {0}")]
     SurfelSize(f64),
     /// The probability is not between 0 and 1.
-    #[error("a probability of {0} that each surfel has a point; it must be more than 0 and less than 1")]
+    #[error("expected a probability above 0 and below 1 that each surfel has a point, got {0}")]
     Probability(f64),
     /// The tolerance of a refinement in a sphere is out of range.
-    #[error("a tolerance of {0} sampling radii in a sphere; it must be more than 0.01 and at most 1")]
+    #[error("expected a tolerance of the refinement above 0.01 and at most 1 sampling radius, got {0}")]
     Refinement(f64),
     /// The spacing or tolerance of curves is not positive and finite.
-    #[error("a spacing or tolerance of {0}; it must be finite and more than 0")]
+    #[error("expected a finite spacing or tolerance above 0, got {0}")]
     CurveLength(f64),
     /// Sampling and interpolation decide whether surfaces cross, not how far apart they are.
     #[error(
-        "the methods `sampling` and `interpolation` compare surfaces, without a margin; leave the margin and the thickness out"
+        "expected no margin and no radius about the points with the methods `sampling` and `interpolation`, got one; leave it out, \
+         or use the method `traversal`"
     )]
     SamplingAlone,
     /// The surfaces of the two scans are defined by different metrics.
     #[error(
-        "one scan is prepared for the {} kernel, the other for the {} one; prepare both for the same",
+        "expected two scans prepared for the same kernel, got the {} and the {} kernel; prepare one of them again",
         .0[0], .0[1]
     )]
     Metrics([Metric; 2]),
     /// A scan was prepared for another metric than the options ask for.
     #[error(
-        "asked by the {asked} kernel of a scan that is prepared for the {stored} one; prepare it for the {asked} kernel, or \
-         ask by the {stored} one"
+        "expected scans prepared for the {asked} kernel, got the {stored} kernel; prepare them for the {asked} kernel, or \
+         ask for the {stored} kernel"
     )]
     Metric {
         /// The metric that was asked for.

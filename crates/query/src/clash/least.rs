@@ -29,6 +29,6 @@ impl Least {
             return Self { lower: 0.0, upper: points };
         }
         let gap = f64::from(pair.gap_of_parts(leaves) - pair.relative.slack());
-        Self { lower: (gap * pair.views[0].placed().scale()).max(0.0), upper: points }
+        Self { lower: (gap * pair.views[0].stored_to_world().scale()).max(0.0), upper: points }
     }
 }

@@ -71,10 +71,10 @@ pub(crate) fn nearness(
         let unknown = Nearness { lower: 0.0, upper: f64::INFINITY, evidence: Evidence::Estimated };
         return vec![unknown; groups.len()];
     };
-    let slices = views.map(|view| view.scan().slices());
+    let arrays = views.map(|view| view.scan().arrays());
     let meter = Meter::new(&Budget::UNLIMITED, views, 0);
     let semantics = plan.options().semantics;
-    let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, semantics.part()));
+    let pair = ScanPair::new(views, arrays.each_ref(), relative, meter, (level, semantics.part()));
     let proves_upper = !matches!(semantics, Semantics::Surface);
     // The distance of the two places of a contact, less their balls. A residual is half the
     // distance with the balls.

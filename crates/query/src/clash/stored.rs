@@ -26,5 +26,5 @@ fn stored_of(view: &Placed<'_>, contacts: &[Contact], side: usize) -> Vec<usize>
 
 /// Returns the numbers of the leaves that hold two stored points.
 pub(crate) fn leaves(views: [&Placed<'_>; 2], points: [usize; 2]) -> [usize; 2] {
-    [0, 1].map(|side| views[side].scan().slices().leaves.leaf_of(points[side]))
+    [0, 1].map(|side| views[side].scan().arrays().leaves.leaf_of(points[side]))
 }

@@ -65,7 +65,8 @@ impl BoxVisitor for Balls<'_> {
 
     #[inline]
     fn least_apart(&mut self, least: f32) {
-        let bound = f64::from(least - self.pair.relative.slack()) * self.pair.views[0].placed().scale();
+        let bound =
+            f64::from(least - self.pair.relative.slack()) * self.pair.views[0].stored_to_world().scale();
         self.apart = self.apart.min(bound);
     }
 }

@@ -15,7 +15,7 @@ use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{Frontier, Heap, NodePair, Open, PairVisitor, Stack, resume};
 
 use crate::pair::bounds::{BoundVisitor, Pairs};
-use crate::pair::motion::{Gaps, LANES, Limits, Motion};
+use crate::pair::relative_pose::{Gaps, LANES, Limits, RelativePose};
 use crate::pair::scan_pair::{ScanPair, balls_apart};
 
 /// A proof that two scans are separated: node pairs with disjoint enclosures that together cover
@@ -65,17 +65,22 @@ impl ProofScratch {
 
 /// Returns `true` if a proof would fail at these leaves: neither their enclosures nor their points
 /// are further apart than `reach`.
-pub(crate) fn are_doubtful(pair: &ScanPair<'_>, motion: &Motion, leaves: NodePair, reach: f32) -> bool {
+pub(crate) fn are_doubtful(
+    pair: &ScanPair<'_>,
+    relative_pose: &RelativePose,
+    leaves: NodePair,
+    reach: f32,
+) -> bool {
     if pair.better_gap(leaves, f32::NEG_INFINITY) > reach || pair.gap_of_enclosures(leaves) > reach {
         return false;
     }
-    let gap = gap_of_nodes(pair, motion, leaves);
+    let gap = gap_of_nodes(pair, relative_pose, leaves);
     gap.is_nan() || gap <= reach
 }
 
 /// The gap of the enclosures of two nodes.
-fn gap_of_nodes(pair: &ScanPair<'_>, motion: &Motion, nodes: NodePair) -> f32 {
-    motion.gap(pair.bounds(motion).of(pair.level, nodes).enclosures[0], pair.relative.slack())
+fn gap_of_nodes(pair: &ScanPair<'_>, relative_pose: &RelativePose, nodes: NodePair) -> f32 {
+    relative_pose.gap(pair.bounds(relative_pose).of(pair.level, nodes).enclosures[0], pair.relative.slack())
 }
 
 /// The search for a proof, or for two leaves at which it fails.
@@ -107,10 +112,10 @@ impl<'c, 'a> Certifier<'c, 'a> {
         scratch: &mut ProofScratch,
         (proof, is_hinted): (Option<&mut Proof>, bool),
     ) -> Option<(f64, f64)> {
-        let motion = &self.pair.motion(pose);
+        let relative_pose = &self.pair.relative_pose(pose);
         let (pair, reach) = (&*self.pair, self.reach);
         let fails =
-            |&leaves: &NodePair| !pair.are_leaves(leaves) || are_doubtful(pair, motion, leaves, reach);
+            |&leaves: &NodePair| !pair.are_leaves(leaves) || are_doubtful(pair, relative_pose, leaves, reach);
         if let Some(&leaves) = compared.iter().find(|leaves| fails(leaves)) {
             self.doubtful = Some(leaves);
             return None;
@@ -121,7 +126,7 @@ impl<'c, 'a> Certifier<'c, 'a> {
         let before = self.pair.meter.spent.node_pairs;
         let gap = self.pair.gap_of_enclosures(NodePair::ROOTS);
         let mut proving =
-            Proving::new(self.pair, motion, self.reach, is_hinted || proof.is_some(), (near, rest));
+            Proving::new(self.pair, relative_pose, self.reach, is_hinted || proof.is_some(), (near, rest));
         if let Some(key) = proving.file(NodePair::ROOTS, f32::NEG_INFINITY, gap) {
             open.push(Open { pair: NodePair::ROOTS, key });
         }
@@ -135,7 +140,8 @@ impl<'c, 'a> Certifier<'c, 'a> {
         let gap = if proving.is_cut { least.key.min(proving.enough) } else { least.key };
         let proven = self.in_world(gap);
         // For distant scans the bounding balls prove more than boxes.
-        let balls = balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].placed().scale();
+        let balls =
+            balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].stored_to_world().scale();
         #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
         let key = (balls * (1.0 - 1e-6)) as f32;
         let distance = self.in_world(key).max(proven);
@@ -161,14 +167,14 @@ impl<'c, 'a> Certifier<'c, 'a> {
         open: &[NodePair],
         scratch: &mut ProofScratch,
     ) -> Option<()> {
-        let motion = &self.pair.motion(pose);
+        let relative_pose = &self.pair.relative_pose(pose);
         scratch.clear();
         self.proven.clear();
         for &pair in open {
             scratch.open.push(Open { pair, key: f32::NEG_INFINITY });
         }
         let aside = (&mut scratch.near, &mut scratch.rest);
-        let mut proving = Proving::new(self.pair, motion, self.reach, true, aside);
+        let mut proving = Proving::new(self.pair, relative_pose, self.reach, true, aside);
         let is_whole = proving.run(&mut scratch.open);
         self.doubtful = proving.doubtful;
         self.proven.extend(scratch.apart().map(|own| Bound { gap: own.key, pair: own.pair }));
@@ -179,7 +185,7 @@ impl<'c, 'a> Certifier<'c, 'a> {
     fn in_world(&self, gap: f32) -> f64 {
         let slack = self.pair.relative.slack();
         // Minus the rounding errors of the scale and the product.
-        f64::from(gap - slack) * self.pair.views[0].placed().scale() * (1.0 - 1e-9)
+        f64::from(gap - slack) * self.pair.views[0].stored_to_world().scale() * (1.0 - 1e-9)
     }
 }
 
@@ -187,14 +193,14 @@ impl<'c, 'a> Certifier<'c, 'a> {
 /// proof is likeliest to fail there.
 struct Proving<'p, 'a> {
     pair: &'p mut ScanPair<'a>,
-    motion: &'p Motion,
+    relative_pose: &'p RelativePose,
     /// Enclosures must be further apart than this, in a's stored frame.
     reach: f32,
     /// `true` if all disjoint pairs are requested.
     lists: bool,
     /// [`KEPT`] times the smallest gap so far. A pair with at least this gap is not split further.
     enough: f32,
-    /// The same limit in the unit of [`Motion::gaps`]: minus the distance of the scans' centres.
+    /// The same limit in the unit of [`RelativePose::gaps`]: minus the distance of the scans' centres.
     beyond: f32,
     /// `true` if a pair with a gap of at least `enough` was dropped.
     is_cut: bool,
@@ -209,20 +215,20 @@ struct Proving<'p, 'a> {
 impl<'p, 'a> Proving<'p, 'a> {
     fn new(
         pair: &'p mut ScanPair<'a>,
-        motion: &'p Motion,
+        relative_pose: &'p RelativePose,
         reach: f32,
         lists: bool,
         (near, rest): (&'p mut Vec<Open>, &'p mut Vec<Open>),
     ) -> Self {
         let infinite = f32::INFINITY;
         let (enough, beyond) = (infinite, infinite);
-        Self { pair, motion, reach, lists, enough, beyond, is_cut: false, near, rest, doubtful: None }
+        Self { pair, relative_pose, reach, lists, enough, beyond, is_cut: false, near, rest, doubtful: None }
     }
 
     /// Splits the open pairs until all are disjoint. Returns `false` if that fails at two leaves,
     /// or if the budget ends.
     fn run(&mut self, open: &mut Stack) -> bool {
-        let (bounds, level) = (self.pair.bounds(self.motion), self.pair.level);
+        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level);
         self.doubtful.is_none() && resume(&bounds, level, open, self).is_continue()
     }
 
@@ -230,7 +236,7 @@ impl<'p, 'a> Proving<'p, 'a> {
     /// consists of leaves or `most` more node pairs were compared. Returns the pair with the
     /// smallest gap, or the last pair that was split if only pairs with sufficient gaps remain.
     fn tighten(&mut self, most: u64, nearest: &mut Heap) -> Option<Open> {
-        let (bounds, level) = (self.pair.bounds(self.motion), self.pair.level);
+        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level);
         nearest.extend(self.near.drain(..));
         let most = self.pair.meter.spent.node_pairs + most;
         let mut tightening = Tightening { proving: self, most, last: None, is_over: false };
@@ -279,7 +285,7 @@ impl<'p, 'a> Proving<'p, 'a> {
         if own.key < self.enough {
             if KEPT * own.key < self.enough {
                 self.enough = KEPT * own.key;
-                self.beyond = self.motion.beyond_gap(self.enough, self.pair.relative.slack());
+                self.beyond = self.relative_pose.beyond_gap(self.enough, self.pair.relative.slack());
             }
             return true;
         }
@@ -310,7 +316,7 @@ impl PairVisitor for Proving<'_, '_> {
 
     /// Leaves reached when a proof is continued from an earlier one.
     fn leaf_pair(&mut self, _: [usize; 2], open: &Open) -> ControlFlow<()> {
-        let gap = gap_of_nodes(self.pair, self.motion, open.pair);
+        let gap = gap_of_nodes(self.pair, self.relative_pose, open.pair);
         self.file(open.pair, open.key, gap);
         self.compared(1)
     }
@@ -330,7 +336,7 @@ impl BoundVisitor<f32> for Proving<'_, '_> {
 
     #[inline(always)]
     fn key(&mut self, _: &Open, pair: NodePair, boxes: f32, enclosures: f32) -> Option<f32> {
-        let gap = self.motion.gap(enclosures, self.pair.relative.slack());
+        let gap = self.relative_pose.gap(enclosures, self.pair.relative.slack());
         self.file(pair, boxes, gap)
     }
 }
@@ -369,10 +375,11 @@ impl BoundVisitor<f32> for Tightening<'_, '_, '_> {
     /// A pair stays unsplit if some of its children have no greater gap than the pair itself.
     #[inline]
     fn may_split(&mut self, above: &Open, pairs: &Pairs, gaps: &Gaps) -> bool {
-        let Proving { motion, pair, .. } = &*self.proving;
+        let Proving { relative_pose, pair, .. } = &*self.proving;
         let slack = pair.relative.slack();
-        let shows_less =
-            |lane: usize| gaps.near >> lane & 1 != 0 && motion.gap(gaps.enclosures[lane], slack) <= above.key;
+        let shows_less = |lane: usize| {
+            gaps.near >> lane & 1 != 0 && relative_pose.gap(gaps.enclosures[lane], slack) <= above.key
+        };
         self.last = Some(*above);
         self.is_over = (0..LANES).any(shows_less);
         self.proving.is_cut |= !self.is_over && gaps.near != pairs.lanes;
@@ -381,7 +388,7 @@ impl BoundVisitor<f32> for Tightening<'_, '_, '_> {
 
     #[inline]
     fn key(&mut self, _: &Open, pair: NodePair, _: f32, enclosures: f32) -> Option<f32> {
-        let gap = self.proving.motion.gap(enclosures, self.proving.pair.relative.slack());
+        let gap = self.proving.relative_pose.gap(enclosures, self.proving.pair.relative.slack());
         self.proving.is_near(&Open { pair, key: gap }).then_some(gap)
     }
 }

@@ -124,18 +124,18 @@ pub(crate) fn collide_by<'q>(
     let options = plan.options();
     let meter = Meter::new(budget, [a, b], evaluations);
     let (pose, relative) = match relative(a, b, plan) {
-        Ok(motion) => motion,
+        Ok(relative_pose) => relative_pose,
         Err(early) => return without_a_search(asked, early, meter.spent, outputs),
     };
     let by = (scratch.level, options.semantics.part());
-    let slices = [a.scan().slices(), b.scan().slices()];
-    let pair = ScanPair::new([a, b], slices.each_ref(), relative, meter, by);
+    let arrays = [a.scan().arrays(), b.scan().arrays()];
+    let pair = ScanPair::new([a, b], arrays.each_ref(), relative, meter, by);
     let manifold = outputs.manifold.take();
     let answer = decide(pair, &pose, asked, scratch, outputs, look);
     match (answer.verdict, manifold) {
         (Verdict::Intersecting { contact, .. }, Some(points)) => {
             let meter = Meter::new(budget, [a, b], evaluations).after(answer.statistics);
-            let mut pair = ScanPair::new([a, b], slices.each_ref(), relative, meter, by);
+            let mut pair = ScanPair::new([a, b], arrays.each_ref(), relative, meter, by);
             manifold::gather(&mut pair, options, &contact, &mut scratch.manifold, points);
             Answer { statistics: pair.meter.spent, ..answer }
         }
@@ -162,7 +162,7 @@ fn without_a_search(
     if let Some(proof) = outputs.proof.filter(|_| asked.plan.options().certifies()) {
         proof.pairs.push((NodePair::ROOTS, distance));
     }
-    let reach = |view: &Placed<'_>| f64::from(view.scan().root_box().reach) * view.placed().scale();
+    let reach = |view: &Placed<'_>| f64::from(view.scan().root_box().reach) * view.stored_to_world().scale();
     let band = asked.scans.map(reach).into_iter().fold(0.0, f64::max);
     Answer { verdict, band, distance_estimate: None, statistics }
 }

@@ -1,5 +1,5 @@
 //! Temporal coherence: the result of a query about two scans speeds up the next query after a small
-//! motion.
+//! relative_pose.
 //!
 //! Scans that met probably still meet, so the two points whose discs crossed are tested first, then
 //! their leaves. Scans that were separated and move slowly keep the pruned node pairs of the last
@@ -59,7 +59,7 @@ struct Question {
 
 /// A node pair that is disjoint until b's travel reaches `until`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Standing {
+struct FrontierPair {
     pair: NodePair,
     until: f64,
 }
@@ -79,7 +79,7 @@ pub(crate) struct Known {
     /// The scans are separated until b's travel reaches this value.
     clear: f64,
     /// The frontier: if `is_whole`, pairs that cover all pairs of points.
-    front: Vec<Standing>,
+    frontier: Vec<FrontierPair>,
     is_whole: bool,
     /// `true` if the enclosures of the frontier's pairs are disjoint, `false` if only their boxes
     /// are.
@@ -97,7 +97,7 @@ impl PairHint {
         let question = Question {
             options: *options,
             scans: pair.views.map(|view| (view.scan().outline().identity, *view.scan().topology())),
-            scale: pair.views[0].placed().scale(),
+            scale: pair.views[0].stored_to_world().scale(),
         };
         match &mut self.known {
             Some(known) if known.question == question => {}
@@ -107,8 +107,8 @@ impl PairHint {
     }
 }
 
-/// An upper bound on how far the motion between two poses moves any point of b.
-fn motion(pair: &ScanPair<'_>, from: &Pose, to: &Pose) -> f64 {
+/// An upper bound on how far the relative_pose between two poses moves any point of b.
+fn relative_pose(pair: &ScanPair<'_>, from: &Pose, to: &Pose) -> f64 {
     let Ball { centre, radius } = pair.b.outline.surface;
     let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
     let turn = (to.rotation() * to.scale() - from.rotation() * from.scale()).norm();
@@ -124,7 +124,7 @@ impl Known {
             step: f64::MAX,
             met: None,
             clear: f64::MIN,
-            front: Vec::new(),
+            frontier: Vec::new(),
             is_whole: false,
             is_proof: false,
             fresh: 0,
@@ -135,7 +135,7 @@ impl Known {
     /// Records that b is at `pose`. If the travel is too long or NaN, everything but the question
     /// is forgotten.
     pub(crate) fn come_to(&mut self, pose: Pose, pair: &ScanPair<'_>) {
-        self.step = self.pose.map_or(f64::MAX, |from| motion(pair, &from, &pose));
+        self.step = self.pose.map_or(f64::MAX, |from| relative_pose(pair, &from, &pose));
         self.pose = Some(pose);
         // Rounded up so that no step is lost.
         let travel = if self.step > 0.0 { (self.travel + self.step).next_up() } else { self.travel };
@@ -182,15 +182,18 @@ impl Known {
     pub(crate) fn distance(&self, pair: &ScanPair<'_>, reach: f64) -> Option<f64> {
         // Now as then, the pose has a rounding error.
         let left = self.clear - self.travel - f64::from(pair.relative.slack());
-        (left > f64::from(pair.stored(reach))).then(|| left * pair.views[0].placed().scale() * (1.0 - 1e-9))
+        (left > f64::from(pair.stored(reach)))
+            .then(|| left * pair.views[0].stored_to_world().scale() * (1.0 - 1e-9))
     }
 
     /// Returns `true` if [`Known::look_again`] can replace a search. If the question `certifies`,
     /// this also requires that the proof would fail again.
     pub(crate) fn has_front(&self, pair: &ScanPair<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
-            let motion = self.pose.map(|pose| pair.motion(&pose));
-            pair.are_leaves(leaves) && motion.is_some_and(|motion| are_doubtful(pair, &motion, leaves, reach))
+            let relative_pose = self.pose.map(|pose| pair.relative_pose(&pose));
+            pair.are_leaves(leaves)
+                && relative_pose
+                    .is_some_and(|relative_pose| are_doubtful(pair, &relative_pose, leaves, reach))
         };
         self.is_slow(pair, SLOW)
             && self.is_whole
@@ -260,22 +263,22 @@ impl Known {
         mut open: impl FnMut(NodePair, f32),
     ) -> bool {
         let parted = self.travel + (f64::from(reach) + f64::from(slack));
-        let expired = self.front.iter().filter(|standing| standing.until <= parted).count();
-        if expired * MOST_EXPIRED > self.front.len() {
+        let expired = self.frontier.iter().filter(|entry| entry.until <= parted).count();
+        if expired * MOST_EXPIRED > self.frontier.len() {
             return false;
         }
         let mut i = 0;
-        while let Some(&Standing { pair, until }) = self.front.get(i) {
+        while let Some(&FrontierPair { pair, until }) = self.frontier.get(i) {
             if until > parted {
                 i += 1;
                 continue;
             }
             let gap = gap(pair);
             if gap > reach {
-                self.front[i].until = self.until(gap, slack);
+                self.frontier[i].until = self.until(gap, slack);
                 i += 1;
             } else {
-                self.front.swap_remove(i);
+                self.frontier.swap_remove(i);
                 open(pair, gap);
             }
         }
@@ -293,7 +296,7 @@ impl Known {
         let met = met.map(|met| met.map(|i| i as u32));
         self.met = met;
         self.clear = f64::MIN;
-        self.front.clear();
+        self.frontier.clear();
         self.is_whole = false;
         self.is_proof = false;
         self.doubtful = None;
@@ -338,22 +341,24 @@ impl Known {
     /// Adds pairs with their gaps to the frontier, or starts a new one.
     fn add(&mut self, pairs: impl Iterator<Item = (f32, NodePair)>, slack: f32) {
         if !self.is_whole {
-            self.front.clear();
+            self.frontier.clear();
         }
-        let mut front = std::mem::take(&mut self.front);
-        front.extend(pairs.map(|(gap, pair)| Standing { pair, until: self.until(gap, slack).max(f64::MIN) }));
+        let mut frontier = std::mem::take(&mut self.frontier);
+        frontier.extend(
+            pairs.map(|(gap, pair)| FrontierPair { pair, until: self.until(gap, slack).max(f64::MIN) }),
+        );
         if !self.is_whole {
-            self.fresh = front.len();
+            self.fresh = frontier.len();
         }
-        self.clear = front.iter().map(|standing| standing.until).fold(f64::MAX, f64::min);
-        self.is_whole = front.len() <= self.fresh.saturating_mul(GROWN);
-        self.front = front;
+        self.clear = frontier.iter().map(|entry| entry.until).fold(f64::MAX, f64::min);
+        self.is_whole = frontier.len() <= self.fresh.saturating_mul(GROWN);
+        self.frontier = frontier;
         self.met = None;
     }
 
     /// Records only that the scans are `distance` apart in the world.
     pub(crate) fn clear_to(&mut self, distance: f64, pair: &ScanPair<'_>) {
-        let distance = distance / pair.views[0].placed().scale() * (1.0 - 1e-9);
+        let distance = distance / pair.views[0].stored_to_world().scale() * (1.0 - 1e-9);
         self.clear = (self.travel + (distance - f64::from(pair.relative.slack()))).next_down();
     }
 }

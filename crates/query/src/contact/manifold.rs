@@ -132,12 +132,15 @@ struct Solid {
 impl Solid {
     fn new(pair: &ScanPair<'_>, options: &CollideOptions) -> Self {
         let spacing = pair.views.map(|view| view.sampling_radius());
-        let radii = pair.views.map(|view| view.scan().outline().discs.radius * view.placed().scale());
+        let radii =
+            pair.views.map(|view| view.scan().outline().discs.radius * view.stored_to_world().scale());
         Self {
             semantics: options.semantics,
             margin: options.margin,
             spacing: spacing[0].max(spacing[1]),
-            centres: pair.views.map(|view| view.placed().apply(view.scan().outline().discs.centre).into()),
+            centres: pair
+                .views
+                .map(|view| view.stored_to_world().apply(view.scan().outline().discs.centre).into()),
             lesser: usize::from(radii[1] < radii[0]),
             oriented: pair.views.map(|view| view.scan().is_oriented()),
         }
@@ -174,7 +177,7 @@ impl Solid {
                 let gap = normal.dot(&between);
                 let side = usize::from(!neighbour.of_b);
                 let disc = [pair.a.discs.get(i), pair.b.discs.get(j)][side];
-                let disc = f64::from(disc) * pair.views[side].placed().scale();
+                let disc = f64::from(disc) * pair.views[side].stored_to_world().scale();
                 // Beside the disc its plane is meaningless.
                 if between.norm_squared() - gap * gap > disc * disc || gap < -self.spacing {
                     return None;
@@ -209,7 +212,7 @@ impl Solid {
     fn way_out(&self, pair: &ScanPair<'_>, of_b: bool, points: [usize; 2]) -> Vector3<f64> {
         let normal = |side: usize| {
             let stored = pair.views[side].scan().normals()[points[side]].map(f64::from);
-            Vector3::from(pair.views[side].placed().rotate(stored))
+            Vector3::from(pair.views[side].stored_to_world().rotate(stored))
         };
         let own = usize::from(!of_b);
         let other = 1 - own;

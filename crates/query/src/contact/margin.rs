@@ -75,7 +75,7 @@ impl Surfaces<'_> {
                 match self.pair.doubt_about(i, j) {
                     Some(reason) => _ = self.doubt.get_or_insert(reason),
                     None => {
-                        let placed = self.pair.views[0].placed();
+                        let placed = self.pair.views[0].stored_to_world();
                         let world = [x, y].map(|v| Vector3::from(placed.apply(v.map(f64::from).into())));
                         return self.met(world, i, j);
                     }
@@ -97,8 +97,8 @@ impl Surfaces<'_> {
     /// The contact midway between two points.
     fn between(&self, [p, q]: [Vector3<f64>; 2], i: usize, j: usize) -> Contact {
         let [va, vb] = self.pair.views;
-        let na = va.placed().rotate(self.pair.a.normals[i].map(f64::from));
-        let nb = vb.placed().rotate(self.pair.b.normals[j].map(f64::from));
+        let na = va.stored_to_world().rotate(self.pair.a.normals[i].map(f64::from));
+        let nb = vb.stored_to_world().rotate(self.pair.b.normals[j].map(f64::from));
         Contact {
             point: (0.5 * (p + q)).into(),
             normals: Some([na, nb]),
@@ -131,7 +131,7 @@ impl Surfaces<'_> {
         let step = |side: usize, from: &Projection, to: &Projection| {
             let [from, to, n] = [from.point, to.point, from.at.normal].map(Vector3::from);
             let along = (to - from) - n * n.dot(&(to - from));
-            let most = f64::from(radii[side]) * views[side].placed().scale();
+            let most = f64::from(radii[side]) * views[side].stored_to_world().scale();
             from + along * (most / along.norm()).min(1.0)
         };
         let (mut x, mut y) = (land(0, p), land(1, q));

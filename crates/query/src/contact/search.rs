@@ -166,7 +166,7 @@ impl<'a> Surfaces<'a> {
             return None;
         }
         let [scratch_a, scratch_b] = &mut *self.gathers;
-        let scale = vb.placed().scale() / va.placed().scale();
+        let scale = vb.stored_to_world().scale() / va.stored_to_world().scale();
         let radius = f64::from(self.pair.a.radii[i]).max(f64::from(self.pair.b.radii[j]) * scale);
         let start = contact.point;
         let meter = &mut self.pair.meter;
@@ -178,7 +178,7 @@ impl<'a> Surfaces<'a> {
             Some([va.evaluate_near(i, x, scratch_a), vb.evaluate_near(j, x, scratch_b)])
         })?;
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
-        let nearby = NEARBY * radius * va.placed().scale();
+        let nearby = NEARBY * radius * va.stored_to_world().scale();
         let is_obstacle = || va.is_obstacle(i, meeting.point) && vb.is_obstacle(j, meeting.point);
         let holds = meeting.verified && moved <= nearby;
         (holds && (self.pair.part == Part::Surface || is_obstacle())).then(|| Contact {

@@ -59,7 +59,7 @@ impl Approach<'_, '_> {
     /// the distance; otherwise halves `share`. Returns `false` if no step is worth trying.
     fn step(&mut self, side: usize, feet: &mut [Projection; 2], share: &mut f64) -> bool {
         let view = self.views[side];
-        let radius = f64::from(view.scan().radii()[self.samples[side]]) * view.placed().scale();
+        let radius = f64::from(view.scan().radii()[self.samples[side]]) * view.stored_to_world().scale();
         let to = between(feet) * [1.0, -1.0][side];
         let (distance, normal) = (to.norm(), Vector3::from(feet[side].at.normal));
         let along = to - normal * normal.dot(&to);

@@ -10,7 +10,7 @@ use nearmiss_lanes::order::{ascending, from_ascending};
 
 use crate::leaf::nearest_points::{PointPair, nearest};
 use crate::pair::bounds::BoundVisitor;
-use crate::pair::motion::{Limits, Motion};
+use crate::pair::relative_pose::{Limits, RelativePose};
 use crate::pair::scan_pair::ScanPair;
 
 type Open = hierarchy::Open<Nearness>;
@@ -112,7 +112,7 @@ impl hierarchy::Frontier<Nearness> for Frontier {
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
     pub(crate) pair: ScanPair<'a>,
-    motion: &'a Motion,
+    relative_pose: &'a RelativePose,
     /// The nearest points so far.
     pub(crate) best: PointPair,
     /// `true` if the enclosures are compared, too.
@@ -134,24 +134,34 @@ pub(crate) struct Search<'a> {
 impl<'a> Search<'a> {
     /// A search that starts from an arbitrary point pair, for the nearest points and, if
     /// `of_enclosures`, the nearest enclosures of leaves.
-    pub(crate) fn new(pair: ScanPair<'a>, motion: &'a Motion, of_enclosures: bool) -> Self {
+    pub(crate) fn new(pair: ScanPair<'a>, relative_pose: &'a RelativePose, of_enclosures: bool) -> Self {
         let enclosures = if of_enclosures { f32::INFINITY } else { f32::NEG_INFINITY };
         let best = PointPair::new(&pair, [0, 0]);
-        let points = motion.beyond(motion.bound_of(best.distance));
+        let points = relative_pose.beyond(relative_pose.bound_of(best.distance));
         let (share, near_enough, stops_at_zero) = (None, f64::NEG_INFINITY, false);
-        Self { pair, motion, best, of_enclosures, points, enclosures, share, near_enough, stops_at_zero }
+        Self {
+            pair,
+            relative_pose,
+            best,
+            of_enclosures,
+            points,
+            enclosures,
+            share,
+            near_enough,
+            stops_at_zero,
+        }
     }
 
     /// Searches from the roots down. Breaks if the search was ended early.
     pub(crate) fn run(&mut self, open: &mut Frontier) -> ControlFlow<()> {
-        open.start(Nearness::new(self.motion.least(), self.motion.least()));
+        open.start(Nearness::new(self.relative_pose.least(), self.relative_pose.least()));
         self.pair.meter.go_on()?;
         self.go_on(open)
     }
 
     /// Searches the open pairs.
     pub(crate) fn go_on(&mut self, open: &mut Frontier) -> ControlFlow<()> {
-        let (bounds, level) = (self.pair.bounds(self.motion), self.pair.level);
+        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level);
         resume(&bounds, level, open, self)
     }
 
@@ -168,7 +178,7 @@ impl<'a> Search<'a> {
     }
 
     fn proven(&self, beyond: f32) -> f64 {
-        self.motion.proven(self.motion.bound(beyond))
+        self.relative_pose.proven(self.relative_pose.bound(beyond))
     }
 
     /// Compares the points of two leaves and updates the limits.
@@ -176,11 +186,11 @@ impl<'a> Search<'a> {
         self.pair.meter.leaf_pair(self.pair.a.leaves.points(a).len(), self.pair.b.leaves.points(b).len());
         self.best = nearest(self.pair.level, &self.pair, leaves, self.best);
         let upper = self.best.distance.max(0.0);
-        self.points = self.motion.beyond(self.motion.bound_of(upper));
+        self.points = self.relative_pose.beyond(self.relative_pose.bound_of(upper));
         if self.of_enclosures
             && let Some(share) = self.share
         {
-            let enough = self.motion.beyond(self.motion.bound_of(upper * share));
+            let enough = self.relative_pose.beyond(self.relative_pose.bound_of(upper * share));
             self.enclosures = self.enclosures.min(enough);
         }
     }
@@ -193,11 +203,11 @@ impl<'a> Search<'a> {
         }
         // Comparing the points of each leaf with the box of the other is much faster than comparing
         // all points.
-        let by_boxes = self.motion.no_nearer(f64::from(self.pair.gap_of_leaf_boxes(leaves)));
+        let by_boxes = self.relative_pose.no_nearer(f64::from(self.pair.gap_of_leaf_boxes(leaves)));
         if by_boxes >= self.enclosures {
             return by_boxes;
         }
-        by_enclosures.max(self.motion.no_nearer(f64::from(self.pair.gap_of_leaves(leaves))))
+        by_enclosures.max(self.relative_pose.no_nearer(f64::from(self.pair.gap_of_leaves(leaves))))
     }
 }
 
@@ -247,7 +257,7 @@ impl BoundVisitor<Nearness> for Search<'_> {
             if self.pair.part == Part::Obstacle
                 && let Some(gap) = self.pair.gap_by_points(pair)
             {
-                enclosures = enclosures.max(self.motion.no_nearer(f64::from(gap)));
+                enclosures = enclosures.max(self.relative_pose.no_nearer(f64::from(gap)));
             }
             boxes = boxes.max(enclosures);
             if boxes >= self.points && enclosures >= self.enclosures {

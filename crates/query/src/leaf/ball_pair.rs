@@ -9,7 +9,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{LeafBlock, Part, Slices};
+use nearmiss_hierarchy::{LeafBlock, Part, ScanArrays};
 use nearmiss_lanes::wide::{bits, load};
 
 use crate::ask::answer::{Contact, Evidence};
@@ -32,7 +32,7 @@ pub(crate) struct Targets<'a> {
 }
 
 impl<'a> Targets<'a> {
-    pub(crate) fn new(scan: &Slices<'_>, (block, first, count): (&'a LeafBlock, usize, usize)) -> Self {
+    pub(crate) fn new(scan: &ScanArrays<'_>, (block, first, count): (&'a LeafBlock, usize, usize)) -> Self {
         let (mut positions, mut balls, mut discs) = ([[0.0; WIDTH]; 3], [0.0; WIDTH], 0);
         for lane in 0..count {
             let p = scan.position(first + lane);
@@ -88,7 +88,7 @@ impl<'a> Targets<'a> {
 
 /// The points of a block and the radii of their balls, 0 for points on sheets.
 #[inline(always)]
-fn balls<S: Simd>(simd: S, scan: &Slices<'_>, block: usize) -> ([f32x16<S>; 3], f32x16<S>) {
+fn balls<S: Simd>(simd: S, scan: &ScanArrays<'_>, block: usize) -> ([f32x16<S>; 3], f32x16<S>) {
     let balls = f32x16::load_array_ref(simd, &scan.obstacle_balls(block));
     (load(simd, &scan.blocks[block].position), balls)
 }
@@ -108,7 +108,7 @@ impl ScanPair<'_> {
 
     /// The radii, in the world, of the balls of points `i` and `j`; zero for points on sheets.
     pub(crate) fn balls(&self, [i, j]: [usize; 2]) -> [f64; 2] {
-        let [sa, sb] = self.views.map(|view| view.placed().scale());
+        let [sa, sb] = self.views.map(|view| view.stored_to_world().scale());
         [f64::from(self.a.obstacle_ball(i)) * sa, f64::from(self.b.obstacle_ball(j)) * sb]
     }
 
@@ -182,8 +182,8 @@ impl ScanPair<'_> {
     fn nearest_of_disc(&self, side: usize, k: usize, x: Vector3<f64>) -> Vector3<f64> {
         let (view, scan) = (self.views[side], [self.a, self.b][side]);
         let centre = Vector3::from(view.point(k));
-        let normal = Vector3::from(view.placed().rotate(scan.normals[k].map(f64::from)));
-        let radius = f64::from(scan.discs.get(k)) * view.placed().scale();
+        let normal = Vector3::from(view.stored_to_world().rotate(scan.normals[k].map(f64::from)));
+        let radius = f64::from(scan.discs.get(k)) * view.stored_to_world().scale();
         let away = x - centre;
         let across = away - normal * normal.dot(&away);
         let length = across.norm();

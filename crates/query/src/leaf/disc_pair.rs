@@ -68,8 +68,8 @@ impl ScanPair<'_> {
         let [va, vb] = self.views;
         let (pa, pb) = (Vector3::from(va.point(i)), Vector3::from(vb.point(j)));
         let double = |[x, y, z]: [f32; 3]| [f64::from(x), f64::from(y), f64::from(z)];
-        let na = Vector3::from(va.placed().rotate(double(self.a.normals[i])));
-        let nb = Vector3::from(vb.placed().rotate(double(self.b.normals[j])));
+        let na = Vector3::from(va.stored_to_world().rotate(double(self.a.normals[i])));
+        let nb = Vector3::from(vb.stored_to_world().rotate(double(self.b.normals[j])));
         let middle = 0.5 * (pa + pb);
         let (fa, fb) = (na.dot(&(pa - middle)), nb.dot(&(pb - middle)));
         let c = na.dot(&nb);
@@ -80,8 +80,8 @@ impl ScanPair<'_> {
             ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
         };
         let radii = [
-            f64::from(self.a.discs.get(i)) * va.placed().scale(),
-            f64::from(self.b.discs.get(j)) * vb.placed().scale(),
+            f64::from(self.a.discs.get(i)) * va.stored_to_world().scale(),
+            f64::from(self.b.discs.get(j)) * vb.stored_to_world().scale(),
         ];
         let place = middle + step;
         // Along the common line each chord is an interval. For parallel planes any point will do.

@@ -1,7 +1,7 @@
 //! Lower bounds on the distance of obstacles, from the points of a leaf.
 //!
 //! No part of the obstacle is further from its nearest point than that point's reach
-//! ([`Slices::obstacle_reach`]). So balls of these radii about the points of a leaf contain its
+//! ([`ScanArrays::obstacle_reach`]). So balls of these radii about the points of a leaf contain its
 //! part of the obstacle. If a leaf spans a gap, such as a silhouette in a depth frame, or contains
 //! strays, its box is mostly empty and these balls give a much better bound.
 
@@ -10,7 +10,7 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{NodePair, OrientedBox, Part, Relative, Slices};
+use nearmiss_hierarchy::{NodePair, OrientedBox, Part, Relative, ScanArrays};
 use nearmiss_lanes::wide::{blocks_of, lanes_of, load};
 
 use crate::pair::scan_pair::ScanPair;
@@ -27,7 +27,7 @@ struct Balls<S: Simd> {
 
 impl<S: Simd> Balls<S> {
     #[inline(always)]
-    fn of(simd: S, scan: &Slices<'_>, leaf: &Range<usize>, block: usize) -> Self {
+    fn of(simd: S, scan: &ScanArrays<'_>, leaf: &Range<usize>, block: usize) -> Self {
         let lanes = lanes_of(block, leaf);
         let reaches = f32x16::load_array_ref(simd, &scan.obstacle_reaches(block));
         Self { centres: load(simd, &scan.blocks[block].position), reaches, lanes }
@@ -114,8 +114,9 @@ impl ScanPair<'_> {
         if a && b {
             return Some(self.gap_of_leaves(pair));
         }
-        let is_loose =
-            |scan: &Slices<'_>, leaf: NodeId| scan.leaves.is_loose(scan.tree.topology().leaf_number(leaf));
+        let is_loose = |scan: &ScanArrays<'_>, leaf: NodeId| {
+            scan.leaves.is_loose(scan.tree.topology().leaf_number(leaf))
+        };
         let [loose_a, loose_b] = [a && is_loose(self.a, pair.a), b && is_loose(self.b, pair.b)];
         if !(loose_a || loose_b) {
             return None;

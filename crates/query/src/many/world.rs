@@ -323,7 +323,7 @@ const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
 /// the rounding error that the query allows for. `None` if the pose is invalid or out of range.
 fn bounds(view: &Placed<'_>) -> Option<Aabb> {
     let root = view.scan().tree().enclosure(Part::Surface, NodeId::ROOT);
-    let placed = view.placed();
+    let placed = view.stored_to_world();
     let scale = placed.scale();
     let centre = placed.apply(root.centre.map(f64::from));
     let edges = [0, 1, 2].map(|j: usize| {

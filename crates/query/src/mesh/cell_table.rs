@@ -117,7 +117,7 @@ mod tests {
         for shared in [1, 2, 10, MOST_SHARED] {
             let table = CellTable::new(shared);
             for a in 0..CELLS as u16 {
-                for step in 0..40 {
+                for step in 0..40_u8 {
                     let (b, a) = (f32::from(step) * 1.6, f32::from(a));
                     let own = table.fewer([a, b]);
                     assert!((0.0..=1.0).contains(&own));

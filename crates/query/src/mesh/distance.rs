@@ -11,7 +11,7 @@ use crate::ask::answer::Statistics;
 use crate::distance::{Frontier, Nearness};
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::pair::bounds::{BoundVisitor, Bounds};
-use crate::pair::motion::{Limits, Motion};
+use crate::pair::relative_pose::{Limits, RelativePose};
 
 /// The distance of two meshes, in world units: lower ≤ distance ≤ upper.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ struct Nearest {
 
 struct Search<'s, 'a> {
     pair: MeshPairing<'a>,
-    motion: &'s Motion,
+    relative_pose: &'s RelativePose,
     best: Nearest,
     /// Pairs whose boxes exceed the distance of the centres by this much cannot improve the best.
     limit: f32,
@@ -60,7 +60,7 @@ impl Search<'_, '_> {
         let distance = found.distance * self.pair.meshes[0].pose().scale();
         if distance < self.best.distance {
             self.best = Nearest { distance, points: found.points, triangles };
-            self.limit = self.motion.beyond(self.motion.bound_of(distance));
+            self.limit = self.relative_pose.beyond(self.relative_pose.bound_of(distance));
         }
     }
 }
@@ -79,7 +79,7 @@ impl PairVisitor<Nearness> for Search<'_, '_> {
 
     fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open<Nearness>) -> ControlFlow<()> {
         let bounds = self.pair.least_distances(leaves);
-        let to_world = f64::from(self.pair.meshes[0].placed().scale());
+        let to_world = f64::from(self.pair.meshes[0].stored_to_world().scale());
         let mut open = self.pair.lanes(leaves);
         // The least bound first: the others may then be out of reach.
         while let Some(lane) = Bits(open).min_by(|&i, &j| bounds[i].total_cmp(&bounds[j])) {
@@ -116,17 +116,17 @@ pub(crate) fn distance(
     open: &mut Frontier,
     hint: Option<&mut Option<[u32; 2]>>,
 ) -> MeshDistance {
-    let motion = pair.motion();
+    let relative_pose = pair.relative_pose();
     let (trees, level) = ([&pair.a.tree, &pair.b.tree], pair.level);
     let best = Nearest { distance: f64::INFINITY, points: [[0.0; 3]; 2], triangles: [0; 2] };
-    let mut search = Search { pair, motion: &motion, best, limit: f32::INFINITY };
+    let mut search = Search { pair, relative_pose: &relative_pose, best, limit: f32::INFINITY };
     let known = hint.as_deref().copied().flatten().map(|hint| hint.map(|i| i as usize));
     let counts = [search.pair.a.triangles.len(), search.pair.b.triangles.len()];
     search.compare(known.filter(|known| known[0] < counts[0] && known[1] < counts[1]).unwrap_or_default());
 
-    let least = motion.least();
+    let least = relative_pose.least();
     open.start(Nearness::new(least, least));
-    let bounds = Bounds { trees, motion: &motion, part: Part::Surface };
+    let bounds = Bounds { trees, relative_pose: &relative_pose, part: Part::Surface };
     let mut flow = search.pair.meter.go_on();
     if flow.is_continue() && search.best.distance > 0.0 {
         flow = resume(&bounds, level, open, &mut search);
@@ -137,7 +137,7 @@ pub(crate) fn distance(
         upper
     } else {
         let least = open.iter().fold(search.limit, |least, key| least.min(key.enclosures()));
-        motion.proven(motion.bound(least)).min(upper)
+        relative_pose.proven(relative_pose.bound(least)).min(upper)
     };
     if let Some(hint) = hint {
         *hint = Some(triangles.map(nearmiss_lanes::id32));

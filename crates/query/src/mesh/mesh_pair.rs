@@ -10,8 +10,8 @@ use crate::mesh::answer::MeshContact;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::triangle_pairs::{least_distances, may_meet};
 use crate::pair::meter::Meter;
-use crate::pair::motion::Motion;
 use crate::pair::placed_balls::PlacedBalls;
+use crate::pair::relative_pose::RelativePose;
 
 /// The cost of a leaf pair, in node pairs.
 const LEAF_PAIR: u64 = 16;
@@ -43,7 +43,8 @@ impl<'a> MeshPairing<'a> {
         budget: &Budget,
         level: Level,
     ) -> Option<Self> {
-        let balls = PlacedBalls::of([meshes[0].placed(), meshes[1].placed()], [*a.ball, *b.ball])?;
+        let balls =
+            PlacedBalls::of([meshes[0].stored_to_world(), meshes[1].stored_to_world()], [*a.ball, *b.ball])?;
         let (stored, relative) = balls.relative();
         let pose = meshes[0].pose().inverse().after(meshes[1].pose());
         let leaves = [a, b].map(|mesh| mesh.tree.topology().leaves() as u64);
@@ -61,10 +62,10 @@ impl<'a> MeshPairing<'a> {
     }
 
     /// Prepares the relative pose for bounds of distances.
-    pub(crate) fn motion(&self) -> Motion {
+    pub(crate) fn relative_pose(&self) -> RelativePose {
         let roots = [self.a, self.b].map(|mesh| mesh.tree.root_box());
-        let placed = [self.meshes[0].placed(), self.meshes[1].placed()];
-        Motion::new(roots, placed, &self.stored)
+        let placed = [self.meshes[0].stored_to_world(), self.meshes[1].stored_to_world()];
+        RelativePose::new(roots, placed, &self.stored)
     }
 
     /// Lower bounds on the distances of the triangle pairs of two leaves, in a's stored frame; see

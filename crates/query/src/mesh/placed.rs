@@ -10,7 +10,7 @@ pub struct PlacedMesh<'a> {
     /// Maps the frame of the mesh's input to the world.
     pose: Pose,
     /// Maps the stored frame to the world.
-    placed: Pose,
+    stored_to_world: Pose,
 }
 
 impl<'a> PlacedMesh<'a> {
@@ -20,8 +20,9 @@ impl<'a> PlacedMesh<'a> {
     pub fn new(mesh: &'a MeshHierarchy, pose: &Pose) -> Self {
         let frame = mesh.frame();
         // Equals `pose.after(frame)`, as the pose of the frame has no rotation.
-        let placed = pose.with_scale(pose.scale() * frame.scale).with_translation(pose.apply(frame.origin));
-        Self { mesh, pose: *pose, placed }
+        let stored_to_world =
+            pose.with_scale(pose.scale() * frame.scale).with_translation(pose.apply(frame.origin));
+        Self { mesh, pose: *pose, stored_to_world }
     }
 
     /// The mesh.
@@ -37,7 +38,7 @@ impl<'a> PlacedMesh<'a> {
     }
 
     /// The pose of the mesh's stored frame.
-    pub(crate) fn placed(&self) -> &Pose {
-        &self.placed
+    pub(crate) fn stored_to_world(&self) -> &Pose {
+        &self.stored_to_world
     }
 }

@@ -31,7 +31,7 @@ pub(crate) fn region(pair: &MeshPairing<'_>, nodes: NodePair) -> ContactRegion {
     let parts = [cut(&a, &b), cut(&b, &a)];
     let [p, q] = parts.map(|part| part.radius());
     let part = if p <= q { parts[0] } else { parts[1] };
-    let placed = pair.meshes[0].placed();
+    let placed = pair.meshes[0].stored_to_world();
     ContactRegion {
         centre: placed.apply(part.centre.map(f64::from)),
         radius: f64::from(part.radius()) * placed.scale(),

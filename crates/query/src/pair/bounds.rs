@@ -7,7 +7,7 @@ use nearmiss_hierarchy::{
 };
 use nearmiss_lanes::wide::{repeated, spread};
 
-use crate::pair::motion::{Gaps, LANES, Limits, Motion};
+use crate::pair::relative_pose::{Gaps, LANES, Limits, RelativePose};
 
 /// The number of children of each node in a comparison of children with children.
 const FAN: usize = 4;
@@ -68,7 +68,7 @@ pub(crate) trait BoundVisitor<K>: PairVisitor<K> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bounds<'a> {
     pub(crate) trees: [&'a Tree<'a>; 2],
-    pub(crate) motion: &'a Motion,
+    pub(crate) relative_pose: &'a RelativePose,
     /// The part of each scan that the enclosures contain.
     pub(crate) part: Part,
 }
@@ -92,13 +92,13 @@ impl Bounds<'_> {
         whole: [bool; 2],
         limits: Limits,
     ) -> (Pairs, Gaps) {
-        let (&Self { trees: [of_a, of_b], motion, part }, alone_a, alone_b) =
+        let (&Self { trees: [of_a, of_b], relative_pose, part }, alone_a, alone_b) =
             (self, LaneNodes::alone(a), LaneNodes::alone(b));
         let (pairs, bounds_a, bounds_b) = match whole {
             [true, true] => (
                 Pairs { of_a: alone_a, of_b: alone_b, lanes: 1 },
                 alone(simd, &of_a.bounds_of(part, a)),
-                alone(simd, &motion.moved(&of_b.bounds_of(part, b))),
+                alone(simd, &relative_pose.moved(&of_b.bounds_of(part, b))),
             ),
             [true, false] => {
                 let below = of_b.topology().grandchildren(b);
@@ -106,7 +106,7 @@ impl Bounds<'_> {
                 (
                     Pairs { of_a: alone_a, of_b: below.nodes, lanes: below.lanes },
                     alone(simd, &of_a.bounds_of(part, a)),
-                    motion.moved(&bounds),
+                    relative_pose.moved(&bounds),
                 )
             }
             [false, true] => {
@@ -114,7 +114,7 @@ impl Bounds<'_> {
                 (
                     Pairs { of_a: below.nodes, of_b: alone_b, lanes: below.lanes },
                     of_a.bounds_of_grandchildren(simd, part, &below),
-                    alone(simd, &motion.moved(&of_b.bounds_of(part, b))),
+                    alone(simd, &relative_pose.moved(&of_b.bounds_of(part, b))),
                 )
             }
             [false, false] => {
@@ -125,11 +125,11 @@ impl Bounds<'_> {
                 (
                     Pairs { of_a: LaneNodes::spread(below_a), of_b: LaneNodes::repeated(below_b), lanes },
                     each_spread(&a),
-                    all_repeated(&motion.moved(&b)),
+                    all_repeated(&relative_pose.moved(&b)),
                 )
             }
         };
-        let mut gaps = motion.gaps(simd, &bounds_a, &bounds_b, limits);
+        let mut gaps = relative_pose.gaps(simd, &bounds_a, &bounds_b, limits);
         gaps.near &= pairs.lanes;
         (pairs, gaps)
     }
@@ -143,7 +143,7 @@ impl<K: PartialOrd + Copy, V: BoundVisitor<K>> Comparison<V, K> for Bounds<'_> {
 
     #[inline(always)]
     fn scale(&self) -> f32 {
-        self.motion.scale
+        self.relative_pose.scale
     }
 
     #[inline(always)]
@@ -226,7 +226,7 @@ mod tests {
         for (count, size) in [([900, 700], 1.0), ([1500, 40], 1.0), ([60, 1100], 0.3), ([17, 900], 4.0)] {
             let scans = [scan(rng, count[0], 1.0), scan(rng, count[1], size)];
             let pose = rotation(rng).with_scale(0.7).with_translation(point_in(rng, 3.0));
-            let [a, b] = [scans[0].slices(), scans[1].slices()];
+            let [a, b] = [scans[0].arrays(), scans[1].arrays()];
             let points = |pair: NodePair| {
                 let [a, b] = [(&a, pair.a), (&b, pair.b)].map(|(scan, node)| {
                     let points = scan.tree.topology().points(node);
@@ -236,12 +236,13 @@ mod tests {
             };
             let product = |((a, b), (c, d)): ((usize, usize), (usize, usize))| (b - a) * (d - c);
             for level in levels() {
-                let motion = Motion::of_centred(&pose);
-                let bounds = Bounds { trees: [&a.tree, &b.tree], motion: &motion, part: Part::Obstacle };
+                let relative_pose = RelativePose::of_centred(&pose);
+                let bounds =
+                    Bounds { trees: [&a.tree, &b.tree], relative_pose: &relative_pose, part: Part::Obstacle };
                 let mut open = vec![NodePair::ROOTS];
                 while let Some(pair) = open.pop() {
                     let leaves = [a.tree.topology().is_leaf(pair.a), b.tree.topology().is_leaf(pair.b)];
-                    let whole = whole(bounds.trees, pair, leaves, motion.scale);
+                    let whole = whole(bounds.trees, pair, leaves, relative_pose.scale);
                     let (pairs, gaps) =
                         dispatch!(level, simd => bounds.split(simd, pair, whole, Limits::NONE));
                     assert_eq!(gaps.near, pairs.lanes);
@@ -252,8 +253,8 @@ mod tests {
                     for (lane, below) in below {
                         let own = dispatch!(level, simd => {
                             let a = alone(simd, &a.tree.bounds_of(Part::Obstacle, below.a));
-                            let b = motion.moved(&b.tree.bounds_of(Part::Obstacle, below.b));
-                            motion.gaps(simd, &a, &alone(simd, &b), Limits::NONE)
+                            let b = relative_pose.moved(&b.tree.bounds_of(Part::Obstacle, below.b));
+                            relative_pose.gaps(simd, &a, &alone(simd, &b), Limits::NONE)
                         });
                         assert_eq!(own.boxes[0], gaps.boxes[lane], "{below:?}, {level:?}");
                         assert_eq!(own.enclosures[0], gaps.enclosures[lane], "{below:?}, {level:?}");

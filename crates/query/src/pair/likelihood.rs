@@ -15,7 +15,7 @@
 //! validation over the scans, the fit beats every constant.
 
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{NodePair, OrientedBox, Slices};
+use nearmiss_hierarchy::{NodePair, OrientedBox, ScanArrays};
 
 use crate::pair::scan_pair::ScanPair;
 
@@ -48,7 +48,7 @@ struct Content {
 
 impl Content {
     /// The content of a node, with lengths multiplied by `scale`.
-    fn of(scan: &Slices<'_>, id: NodeId, scale: f64) -> Self {
+    fn of(scan: &ScanArrays<'_>, id: NodeId, scale: f64) -> Self {
         let OrientedBox { half, reach, .. } = scan.tree.bounds(id);
         let half = half.map(|edge| f64::from(edge) * scale);
         let radius = f64::from(reach.min(scan.sampling_radius)) * scale;

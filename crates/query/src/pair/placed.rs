@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{GeodesicKernel, KernelScratch, SurfaceGraph, SurfaceSamples};
-use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, Slices};
+use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, ScanArrays};
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Metric};
 
@@ -23,7 +23,7 @@ pub struct Placed<'a> {
     graph: Option<&'a SurfaceGraph>,
     shapes: Option<&'a ShapeIndex>,
     /// Maps the stored frame to the world.
-    placed: Pose,
+    stored_to_world: Pose,
 }
 
 impl<'a> Placed<'a> {
@@ -37,8 +37,9 @@ impl<'a> Placed<'a> {
     pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
         let frame = scan.frame();
         // Equals `pose.after(frame)`, as the pose of the frame has no rotation.
-        let placed = pose.with_scale(pose.scale() * frame.scale).with_translation(pose.apply(frame.origin));
-        Self { scan, graph: None, shapes: None, placed }
+        let stored_to_world =
+            pose.with_scale(pose.scale() * frame.scale).with_translation(pose.apply(frame.origin));
+        Self { scan, graph: None, shapes: None, stored_to_world }
     }
 
     /// The same placed scan with its graph, for the geodesic kernel and for searches along the graph.
@@ -93,34 +94,34 @@ impl<'a> Placed<'a> {
     /// The scan's sampling radius in the world.
     #[must_use]
     pub fn sampling_radius(&self) -> f64 {
-        self.scan.sampling_radius() / self.scan.frame().scale * self.placed.scale()
+        self.scan.sampling_radius() / self.scan.frame().scale * self.stored_to_world.scale()
     }
 
     /// The pose of the scan's stored frame.
     #[must_use]
-    pub fn placed(&self) -> &Pose {
-        &self.placed
+    pub fn stored_to_world(&self) -> &Pose {
+        &self.stored_to_world
     }
 
     /// Returns `true` if the pose is finite and its linear part is a rotation with a positive
     /// scale. Products of many poses may drift away from that.
     pub(crate) fn is_proper(&self) -> bool {
-        is_proper(&self.placed)
+        is_proper(&self.stored_to_world)
     }
 
     /// Returns `true` if `x` belongs to the obstacle. `x` is a world point of the implicit surface
     /// near the stored point `i`. It belongs to the obstacle if it is in the cell of its nearest
     /// stored point and that point samples a sheet (`docs/theory/obstacle.md`).
     pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
-        let x = self.placed.apply_inverse(x);
+        let x = self.stored_to_world.apply_inverse(x);
         let nearest = self.scan.nearest_point_near(i, x) as usize;
-        let slices = self.scan.slices();
-        let (position, Slices { normals, radii, .. }) = (slices.position(nearest), slices);
+        let arrays = self.scan.arrays();
+        let (position, ScanArrays { normals, radii, .. }) = (arrays.position(nearest), arrays);
         let away = [0, 1, 2].map(|k| x[k] - f64::from(position[k]));
         let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
         let distance_sq: f64 = away.iter().map(|d| d * d).sum();
-        let most = f64::from(slices.cell_radius(nearest));
-        slices.is_on_sheet(nearest)
+        let most = f64::from(arrays.cell_radius(nearest));
+        arrays.is_on_sheet(nearest)
             && height.abs() <= f64::from(SLAB * radii[nearest])
             && distance_sq <= most * most
     }
@@ -132,7 +133,7 @@ impl<'a> Placed<'a> {
     #[must_use]
     pub fn point(&self, i: usize) -> [f64; 3] {
         let [x, y, z] = PointBlock::position_in(self.scan.blocks(), i);
-        self.placed.apply([f64::from(x), f64::from(y), f64::from(z)])
+        self.stored_to_world.apply([f64::from(x), f64::from(y), f64::from(z)])
     }
 
     /// Returns `true` if f can be evaluated with the scan's metric. Only then can its zeros verify
@@ -145,7 +146,7 @@ impl<'a> Placed<'a> {
     pub(crate) fn evaluate_with(&self, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
         match self.kernel() {
             None => self.in_world(
-                self.scan.evaluate_oriented_with(self.placed.apply_inverse(x), &mut scratch.gather),
+                self.scan.evaluate_oriented_with(self.stored_to_world.apply_inverse(x), &mut scratch.gather),
             ),
             Some(kernel) => self.evaluate_by(&kernel, x, &mut scratch.kernel),
         }
@@ -170,7 +171,7 @@ impl<'a> Placed<'a> {
         x: [f64; 3],
         scratch: &mut KernelScratch,
     ) -> Evaluation {
-        let x = self.placed.apply_inverse(x);
+        let x = self.stored_to_world.apply_inverse(x);
         let nearest = self.scan.nearest_point_near(i, x);
         let at = kernel.evaluate(x, nearest, scratch);
         let at = if self.scan.is_oriented() {
@@ -186,7 +187,8 @@ impl<'a> Placed<'a> {
     pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
         match self.kernel() {
             None => {
-                let at = self.scan.evaluate_near(i, self.placed.apply_inverse(x), &mut scratch.gather);
+                let at =
+                    self.scan.evaluate_near(i, self.stored_to_world.apply_inverse(x), &mut scratch.gather);
                 self.in_world(at.turned_to(self.scan.normals()[i].map(f64::from), 0.0))
             }
             Some(kernel) => self.evaluate_by_near(&kernel, i, x, &mut scratch.kernel),
@@ -202,7 +204,7 @@ impl<'a> Placed<'a> {
         nearest: &mut usize,
         scratch: &mut ViewScratch,
     ) -> Evaluation {
-        let x = self.placed.apply_inverse(x);
+        let x = self.stored_to_world.apply_inverse(x);
         self.in_world(match self.kernel() {
             None => self.scan.evaluate_onward(x, &mut scratch.gather),
             Some(kernel) => {
@@ -215,11 +217,11 @@ impl<'a> Placed<'a> {
 
     /// Converts an evaluation from the stored frame to the world.
     pub(crate) fn in_world(&self, at: Evaluation) -> Evaluation {
-        let scale = self.placed.scale();
+        let scale = self.stored_to_world.scale();
         Evaluation {
             f: at.f * scale,
-            normal: self.placed.rotate(at.normal),
-            centroid: self.placed.apply(at.centroid),
+            normal: self.stored_to_world.rotate(at.normal),
+            centroid: self.stored_to_world.apply(at.centroid),
             bandwidth: at.bandwidth * scale,
             eigenvalues: at.eigenvalues.map(|l| l * scale * scale),
             ..at

@@ -2,21 +2,21 @@
 
 use fearless_simd::Level;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{NodePair, Part, Relative, Slices, TreePair};
+use nearmiss_hierarchy::{NodePair, Part, Relative, ScanArrays, TreePair};
 
 use crate::ask::options::{CollidePlan, Semantics};
 use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
-use crate::pair::motion::Motion;
 use crate::pair::placed::Placed;
 use crate::pair::placed_balls::PlacedBalls;
+use crate::pair::relative_pose::RelativePose;
 
 /// Two placed scans, their arrays, the relative pose, and the cost of the search.
 #[derive(Debug)]
 pub(crate) struct ScanPair<'a> {
     pub(crate) views: [&'a Placed<'a>; 2],
-    pub(crate) a: &'a Slices<'a>,
-    pub(crate) b: &'a Slices<'a>,
+    pub(crate) a: &'a ScanArrays<'a>,
+    pub(crate) b: &'a ScanArrays<'a>,
     pub(crate) relative: Relative,
     pub(crate) meter: Meter,
     /// The part of each scan that the enclosures contain.
@@ -28,18 +28,18 @@ pub(crate) struct ScanPair<'a> {
 impl<'a> ScanPair<'a> {
     pub(crate) fn new(
         views: [&'a Placed<'a>; 2],
-        slices: [&'a Slices<'a>; 2],
+        arrays: [&'a ScanArrays<'a>; 2],
         relative: Relative,
         meter: Meter,
         (level, part): (Level, Part),
     ) -> Self {
-        let [a, b] = slices;
+        let [a, b] = arrays;
         Self { views, a, b, relative, meter, part, level }
     }
 
     /// Returns `true` if both nodes exist and are leaves.
     pub(crate) fn are_leaves(&self, pair: NodePair) -> bool {
-        let is_leaf = |scan: &Slices<'_>, id: NodeId| {
+        let is_leaf = |scan: &ScanArrays<'_>, id: NodeId| {
             let topology = scan.tree.topology();
             topology.has(id) && topology.is_leaf(id)
         };
@@ -78,16 +78,16 @@ impl<'a> ScanPair<'a> {
     }
 
     /// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
-    pub(crate) fn motion(&self, pose: &Pose) -> Motion {
-        motion_of(self.views, pose)
+    pub(crate) fn relative_pose(&self, pose: &Pose) -> RelativePose {
+        relative_pose_of(self.views, pose)
     }
 
     /// The trees of both scans, for a descent by distance.
-    pub(crate) fn bounds<'t>(&self, motion: &'t Motion) -> Bounds<'t>
+    pub(crate) fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
     where
         'a: 't,
     {
-        Bounds { trees: [&self.a.tree, &self.b.tree], motion, part: self.part }
+        Bounds { trees: [&self.a.tree, &self.b.tree], relative_pose, part: self.part }
     }
 
     /// The band at two points, in the world: the greater of their local radii.
@@ -103,7 +103,7 @@ impl<'a> ScanPair<'a> {
 
     /// The greater of two lengths given in the frames of the scans, in the world.
     fn in_world(&self, [of_a, of_b]: [f32; 2]) -> f64 {
-        let [a, b] = self.views.map(|view| view.placed().scale());
+        let [a, b] = self.views.map(|view| view.stored_to_world().scale());
         (f64::from(of_a) * a).max(f64::from(of_b) * b)
     }
 
@@ -111,7 +111,7 @@ impl<'a> ScanPair<'a> {
     /// gap there.
     pub(crate) fn stored(&self, length: f64) -> f32 {
         #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
-        let length = (length / self.views[0].placed().scale()) as f32 * (1.0 + 1e-6);
+        let length = (length / self.views[0].stored_to_world().scale()) as f32 * (1.0 + 1e-6);
         length + self.relative.slack()
     }
 
@@ -129,8 +129,8 @@ impl<'a> ScanPair<'a> {
 }
 
 /// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
-pub(crate) fn motion_of(views: [&Placed<'_>; 2], pose: &Pose) -> Motion {
-    Motion::new(views.map(|view| view.scan().root_box()), views.map(Placed::placed), pose)
+pub(crate) fn relative_pose_of(views: [&Placed<'_>; 2], pose: &Pose) -> RelativePose {
+    RelativePose::new(views.map(|view| view.scan().root_box()), views.map(Placed::stored_to_world), pose)
 }
 
 /// From this many radii on, the distance of the bounding balls is a good bound, and single
@@ -150,7 +150,8 @@ pub(crate) fn relative(
         Semantics::Surface => view.scan().outline().surface,
         Semantics::Thickened(_) => view.scan().outline().discs,
     };
-    let balls = PlacedBalls::of([a.placed(), b.placed()], [about(a), about(b)]).ok_or(None)?;
+    let balls =
+        PlacedBalls::of([a.stored_to_world(), b.stored_to_world()], [about(a), about(b)]).ok_or(None)?;
     // A certificate proves more than the balls, unless the scans are so far apart that balls give
     // nearly the whole distance.
     let gap = balls.gap;
@@ -169,6 +170,6 @@ pub(crate) fn balls_apart([a, b]: [&Placed<'_>; 2], part: Part) -> f64 {
         Part::Obstacle => view.scan().outline().obstacle,
         Part::Surface => view.scan().outline().surface,
     };
-    let balls = PlacedBalls::of([a.placed(), b.placed()], [about(a), about(b)]);
+    let balls = PlacedBalls::of([a.stored_to_world(), b.stored_to_world()], [about(a), about(b)]);
     balls.map_or(f64::NAN, |balls| balls.gap)
 }

@@ -49,7 +49,7 @@ impl Papers<'_, '_> {
             if self.search.pair.meter.go_on().is_break() {
                 break;
             }
-            let x = vb.placed().apply_inverse(va.point(i));
+            let x = vb.stored_to_world().apply_inverse(va.point(i));
             self.search.pair.meter.evaluated(1);
             let at = vb.scan().evaluate_node_with(pair.b.index(), x, &mut self.search.gathers[1].gather);
             if at.status == Status::Outside || at.f.abs() <= near {

@@ -40,12 +40,12 @@ impl Papers<'_, '_> {
                 }
                 let [va, vb] = self.search.pair.views;
                 let between = p + (q - p) * (radius_a / (radius_a + radius_b).max(f32::MIN_POSITIVE));
-                let scale = va.placed().scale();
+                let scale = va.stored_to_world().scale();
                 let contact = Contact {
-                    point: va.placed().apply(between.map(f64::from).into()),
+                    point: va.stored_to_world().apply(between.map(f64::from).into()),
                     normals: Some([
-                        va.placed().rotate(a.normals[i].map(f64::from)),
-                        vb.placed().rotate(b.normals[j].map(f64::from)),
+                        va.stored_to_world().rotate(a.normals[i].map(f64::from)),
+                        vb.stored_to_world().rotate(b.normals[j].map(f64::from)),
                     ]),
                     residual: f64::from(radius_a.max(radius_b)) * scale,
                     sources: [va.scan().id(i), vb.scan().id(j)],

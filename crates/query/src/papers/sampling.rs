@@ -33,7 +33,8 @@ const A_STRETCH: u32 = 256;
 impl Papers<'_, '_> {
     /// `d_ε` in the world.
     fn tolerance(&self, sampling: &Sampling) -> f64 {
-        let radius = |side: usize, own: f32| f64::from(own) * self.search.pair.views[side].placed().scale();
+        let radius =
+            |side: usize, own: f32| f64::from(own) * self.search.pair.views[side].stored_to_world().scale();
         sampling.tolerance
             * radius(0, self.search.pair.a.sampling_radius).max(radius(1, self.search.pair.b.sampling_radius))
     }
@@ -99,7 +100,7 @@ impl Papers<'_, '_> {
             let i = self.scratch.members[below(&mut rng, self.scratch.members.len())] as usize;
             let x = place_in(&mut rng, self.search.pair.a.position(i), self.search.pair.a.radii[i]);
             if volume.distance_sq(x) <= 0.0 {
-                let points = [self.search.pair.a, self.search.pair.b].map(|slices| 0..slices.normals.len());
+                let points = [self.search.pair.a, self.search.pair.b].map(|arrays| 0..arrays.normals.len());
                 self.test(x, [i, 0], points, sampling)?;
             }
         }
@@ -122,7 +123,7 @@ impl Papers<'_, '_> {
         sampling: &Sampling,
     ) -> ControlFlow<()> {
         let [va, vb] = self.search.pair.views;
-        let x = va.placed().apply(x.map(f64::from));
+        let x = va.stored_to_world().apply(x.map(f64::from));
         let means = |at: &Evaluation| at.status == Status::Ok;
         self.search.pair.meter.evaluated(1);
         let at_a = va.evaluate_near(about[0], x, &mut self.search.gathers[0]);
@@ -160,7 +161,7 @@ impl Papers<'_, '_> {
 /// The point nearest to `x`, if it is near enough for a surface to be there: f also vanishes
 /// between two sheets (docs/theory). `None`, too, once the budget is spent.
 fn near(view: &Placed<'_>, x: [f64; 3], points: Range<usize>, meter: &mut Meter) -> Option<usize> {
-    let placed = view.placed();
+    let placed = view.stored_to_world();
     let local = placed.apply_inverse(x);
     let away_sq = |p: [f32; 3]| (Vector3::from(p.map(f64::from)) - Vector3::from(local)).norm_squared();
     let mut nearest = (f64::INFINITY, points.start);
@@ -169,7 +170,7 @@ fn near(view: &Placed<'_>, x: [f64; 3], points: Range<usize>, meter: &mut Meter)
         let end = points.end.min(start + A_STRETCH as usize);
         meter.leaf_work((end - start) as u64 / POINTS_A_PAIR);
         for i in start..end {
-            let away = away_sq(view.scan().slices().position(i));
+            let away = away_sq(view.scan().arrays().position(i));
             nearest = if away < nearest.0 { (away, i) } else { nearest };
         }
     }

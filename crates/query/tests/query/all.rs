@@ -39,12 +39,13 @@ fn found(contacts: &Contacts, scans: [&PointHierarchy; 2]) -> Vec<[usize; 2]> {
 fn crossing(a: &Placed<'_>, b: &Placed<'_>) -> [BTreeSet<[usize; 2]>; 2] {
     let disc = |view: &Placed<'_>, i: usize| oracle::Disc {
         centre: view.point(i),
-        normal: view.placed().rotate(view.scan().normals()[i].map(f64::from)),
-        radius: f64::from(view.scan().discs().get(i)) * view.placed().scale(),
+        normal: view.stored_to_world().rotate(view.scan().normals()[i].map(f64::from)),
+        radius: f64::from(view.scan().discs().get(i)) * view.stored_to_world().scale(),
     };
     let trusted =
         |view: &Placed<'_>, i: usize| matches!(view.scan().kind(i), PointKind::Sheet | PointKind::Edge);
-    let radius = |view: &Placed<'_>, i: usize| f64::from(view.scan().radii()[i]) * view.placed().scale();
+    let radius =
+        |view: &Placed<'_>, i: usize| f64::from(view.scan().radii()[i]) * view.stored_to_world().scale();
     let (leaves_a, leaves_b) = (leaves(a.scan()), leaves(b.scan()));
     let [mut surely, mut maybe] = [BTreeSet::new(), BTreeSet::new()];
     for i in 0..a.scan().len() {

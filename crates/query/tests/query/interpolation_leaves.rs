@@ -31,7 +31,7 @@ impl<'a> Twin<'a> {
         let radii: Vec<f64> = scan.radii().iter().map(|&r| f64::from(r)).collect();
         let options = scan.plan().options();
         let parameters = oracle::Parameters {
-            reach: options.horizon,
+            reach: options.support_radius,
             kernel: oracle::Kernel::Gaussian { theta: options.threshold },
             bandwidth: oracle::Bandwidth::Local,
             least_support: options.support_min as usize,
@@ -47,7 +47,7 @@ impl<'a> Twin<'a> {
     /// The distance of `x` from the surface, positive on the side to which the normal of the
     /// nearest point points (Klein & Zachmann 2005, §3.2). `None` where f is undefined.
     fn side(&self, x: Vector3<f64>) -> Option<f64> {
-        let placed = self.view.placed();
+        let placed = self.view.stored_to_world();
         let at = self.surface.evaluate(placed.apply_inverse(x.into()))?;
         let normal = self.view.scan().normals()[self.nearest(x)].map(f64::from);
         let turned = Vector3::from(at.normal).dot(&Vector3::from(normal)).signum();
@@ -71,7 +71,7 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
     let twin = Twin::new(b);
     let points: Vec<Vector3<f64>> = (0..a.scan().len()).map(|i| a.point(i).into()).collect();
     let sides: Vec<Option<f64>> = points.iter().map(|&p| twin.side(p)).collect();
-    let radius = |j: usize| f64::from(b.scan().radii()[j]) * b.placed().scale();
+    let radius = |j: usize| f64::from(b.scan().radii()[j]) * b.stored_to_world().scale();
     let edges: Vec<[usize; 2]> =
         scans[0].graph.points().edges().edges().map(|edge| edge.map(|i| i as usize)).collect();
 

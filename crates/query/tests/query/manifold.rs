@@ -178,8 +178,8 @@ fn nothing_deeper_is_left_out() {
             }
             let (side, k) = if of_b { (0, i) } else { (1, j) };
             let normal = scans[side].normals()[k].map(f64::from);
-            let height = Vector3::from(views[side].placed().rotate(normal)).dot(&between).abs();
-            let disc = f64::from(scans[side].discs().get(k)) * views[side].placed().scale();
+            let height = Vector3::from(views[side].stored_to_world().rotate(normal)).dot(&between).abs();
+            let disc = f64::from(scans[side].discs().get(k)) * views[side].stored_to_world().scale();
             (between.norm_squared() - height * height <= disc * disc).then_some(height)
         });
         let heights: Vec<f64> = heights.collect();

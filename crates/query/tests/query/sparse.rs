@@ -30,13 +30,13 @@ fn scene(seed: u64) -> Vec<[f64; 3]> {
 /// other scan.
 fn nearest_ball(a: &Placed<'_>, b: &Placed<'_>) -> f64 {
     let all = |view: &Placed<'_>| -> Vec<(oracle::Disc, f64)> {
-        let (scan, scale) = (view.scan(), view.placed().scale());
+        let (scan, scale) = (view.scan(), view.stored_to_world().scale());
         let disc = |i: usize| oracle::Disc {
             centre: view.point(i),
-            normal: view.placed().rotate(scan.normals()[i].map(f64::from)),
+            normal: view.stored_to_world().rotate(scan.normals()[i].map(f64::from)),
             radius: f64::from(scan.discs().get(i)) * scale,
         };
-        let ball = |i: usize| f64::from(scan.slices().ball(i)) * scale;
+        let ball = |i: usize| f64::from(scan.arrays().ball(i)) * scale;
         (0..scan.len()).map(|i| (disc(i), ball(i))).collect()
     };
     let off = |p: &oracle::Disc, (q, ball): &(oracle::Disc, f64)| {

@@ -39,10 +39,10 @@ fn best_crossing(a: &Placed<'_>, b: &Placed<'_>) -> (f64, bool) {
             .map(|i| {
                 let disc = oracle::Disc {
                     centre: view.point(i),
-                    normal: view.placed().rotate(scan.normals()[i].map(f64::from)),
-                    radius: f64::from(scan.discs().get(i)) * view.placed().scale(),
+                    normal: view.stored_to_world().rotate(scan.normals()[i].map(f64::from)),
+                    radius: f64::from(scan.discs().get(i)) * view.stored_to_world().scale(),
                 };
-                let radius = f64::from(scan.radii()[i]) * view.placed().scale();
+                let radius = f64::from(scan.radii()[i]) * view.stored_to_world().scale();
                 (disc, matches!(scan.kind(i), PointKind::Sheet | PointKind::Edge), radius)
             })
             .collect()

@@ -105,7 +105,7 @@ fn boxes_that_leave_their_parents_or_their_points() {
         if id >= topology.inner() {
             // Smaller than the discs in it: one or more of its points extend beyond it.
             let [_, flaw] = found(|scan| lying(scan, id, |bounds| bounds.half[0] *= 0.9));
-            assert!(flaw.is_some_and(|words| words.starts_with("the box about point ")), "leaf {id}");
+            assert!(flaw.is_some_and(|words| words.starts_with("the bounding box of point ")), "leaf {id}");
             let [_, flaw] = found(|scan| lying(scan, id, |bounds| bounds.reach *= 0.5));
             assert!(flaw.is_some_and(|words| words.starts_with("the radius of point ")), "leaf {id}");
         }
@@ -153,15 +153,15 @@ fn points_that_no_build_writes() {
         for value in NONE.into_iter().chain([0.0, -0.1, 1e3]) {
             deep(&named("the radius"), |scan| scan.arrays.radii.to_mut()[i] = value);
         }
-        deep(&format!("the box about point {i}"), |scan| {
-            let x = scan.slices().position(i)[0];
+        deep(&format!("the bounding box of point {i}"), |scan| {
+            let x = scan.arrays().position(i)[0];
             lie_of_position(scan, i, 0, x + 1.0);
         });
         deep(&named("the normal"), |scan| scan.arrays.normals.to_mut()[i] = [0.0; 3]);
         for code in [6, 7, 32, 255] {
             deep(&named("the kind"), |scan| scan.arrays.codes.to_mut()[i] = PointCode(code));
         }
-        deep(&named("the place in the input"), |scan| scan.arrays.source.to_mut()[i] = 301);
+        deep(&named("the source index"), |scan| scan.arrays.source.to_mut()[i] = 301);
     }
 }
 
@@ -171,14 +171,14 @@ fn blocks_that_are_not_the_points() {
     for (block, lane) in [(0, 3), (7, 15), (18, 12), (18, 13)] {
         let copy = format!("the copy of the points of block {block}");
         deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].position[1][lane] = 7.0);
-        deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].horizon[lane] += 0.5);
+        deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].support_radius[lane] += 0.5);
     }
     for value in NONE.into_iter().chain([0.0, -1.0]) {
-        deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].horizon[5] = value);
+        deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].support_radius[5] = value);
     }
-    deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].horizon[5] *= 0.99);
-    deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] += 0.5);
-    deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] = f32::NAN);
+    deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].support_radius[5] *= 0.99);
+    deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] += 0.5);
+    deep("the bounding ball of block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] = f32::NAN);
 }
 
 #[test]
@@ -199,7 +199,7 @@ fn lists_that_are_none() {
         let last = at + scan.arrays.lists[4].count as usize - 1;
         scan.arrays.listed.to_mut()[last] = 19;
     });
-    plain("expected 19 entries in lists, got 18", |scan| {
+    plain("expected 19 entries in neighbour lists, got 18", |scan| {
         scan.arrays.lists = scan.arrays.lists[1..].to_vec().into();
     });
 }
@@ -252,19 +252,21 @@ fn metadata_that_no_build_writes() {
     }
     for value in [f64::NAN, f64::INFINITY] {
         plain("the frame of the stored positions is invalid", |scan| scan.meta.frame.origin[2] = value);
-        plain("the box of bounds is invalid", |scan| scan.meta.bounds.max[0] = value);
-        plain("what rounding cost is invalid", |scan| scan.meta.step = value);
+        plain("the bounding box is invalid", |scan| scan.meta.bounds.max[0] = value);
+        plain("the rounding error is invalid", |scan| scan.meta.step = value);
     }
-    plain("the box of bounds is invalid", |scan| scan.meta.bounds.min[0] = 7.0);
-    deep("the box of bounds", |scan| scan.meta.bounds.min[0] -= 1e-9);
-    deep("the box of bounds", |scan| scan.meta.frame.origin[1] = 0.5);
+    plain("the bounding box is invalid", |scan| scan.meta.bounds.min[0] = 7.0);
+    deep("the bounding box", |scan| scan.meta.bounds.min[0] -= 1e-9);
+    deep("the bounding box", |scan| scan.meta.frame.origin[1] = 0.5);
     for value in [f32::NAN, f32::INFINITY, 0.0, -1.0, 2e12] {
         plain("the sampling radius is invalid", |scan| scan.meta.sampling_radius = value);
     }
     deep("the sampling radius", |scan| scan.meta.sampling_radius *= 1.01);
     deep("the sampling radius", |scan| scan.meta.sampling_radius *= 0.99);
     for value in [0, 2, 33, u32::MAX] {
-        plain("the number of neighbours for a radius is invalid", |scan| scan.meta.radius_neighbours = value);
+        plain("the number of neighbours for local radii is invalid", |scan| {
+            scan.meta.radius_neighbours = value
+        });
     }
     plain("the number of dropped points is invalid", |scan| scan.meta.dropped.duplicate = usize::MAX);
 }

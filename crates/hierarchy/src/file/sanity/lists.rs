@@ -28,20 +28,20 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let left_out = scan.arrays.blocks.iter().enumerate().position(|(number, block)| {
         let group = &scan.arrays.groups[number / PointBlock::WIDTH];
         let lane = number % PointBlock::WIDTH;
-        let ([cx, cy, cz], radius) = (group.position.map(|c| c[lane]), group.horizon[lane]);
-        let PointBlock { position: [x, y, z], horizon, .. } = block;
+        let ([cx, cy, cz], radius) = (group.position.map(|c| c[lane]), group.support_radius[lane]);
+        let PointBlock { position: [x, y, z], support_radius, .. } = block;
         let mut held = [0_u32; PointBlock::WIDTH];
         for i in 0..PointBlock::WIDTH {
             let (dx, dy, dz) = (x[i] - cx, y[i] - cy, z[i] - cz);
-            let room = radius - horizon[i];
+            let room = radius - support_radius[i];
             // Unused lanes have no support.
-            let empty = horizon[i] <= 0.0;
+            let empty = support_radius[i] <= 0.0;
             let within = (room >= 0.0) & (dx * dx + dy * dy + dz * dz <= room * room);
             held[i] = u32::from(empty | within);
         }
         !(radius.is_finite() && held.iter().all(|&held| held != 0))
     });
-    Flaw::first("the ball about block", left_out)?;
+    Flaw::first("the bounding ball of block", left_out)?;
     let count = scan.arrays.groups.len();
     let wrong = scan.arrays.lists.iter().position(|list| {
         let entries =
@@ -64,17 +64,20 @@ pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
             return false;
         };
         index.collect(Level::new(), [cx, cy, cz], within, &mut found);
-        let is_heard = |PointBlock { position: [x, y, z], horizon, .. }: &PointBlock| {
+        let has_support = |PointBlock { position: [x, y, z], support_radius, .. }: &PointBlock| {
             (0..PointBlock::WIDTH).any(|i| {
                 let d = [x[i] - cx, y[i] - cy, z[i] - cz];
-                d.map(|d| f64::from(d).powi(2)).iter().sum::<f64>().sqrt() < f64::from(horizon[i] + within)
+                d.map(|d| f64::from(d).powi(2)).iter().sum::<f64>().sqrt()
+                    < f64::from(support_radius[i] + within)
             })
         };
         let blocks = |group: u32| {
             let first = group as usize * PointBlock::WIDTH;
             &scan.arrays.blocks[first..(first + PointBlock::WIDTH).min(scan.arrays.blocks.len())]
         };
-        found.iter().any(|&group| list.binary_search(&group).is_err() && blocks(group).iter().any(is_heard))
+        found
+            .iter()
+            .any(|&group| list.binary_search(&group).is_err() && blocks(group).iter().any(has_support))
     });
     Flaw::first("the neighbour list of block", incomplete)
 }

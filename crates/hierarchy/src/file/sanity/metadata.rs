@@ -27,7 +27,7 @@ pub(crate) fn checked_topology(points: usize, leaf_size: u32, dense: u32) -> Res
         return wrong("the number of points of a leaf");
     }
     if dense > count || (dense < count && !dense.is_multiple_of(leaf_size)) {
-        return wrong("the number of points that are not sparse");
+        return wrong("the number of dense points");
     }
     Ok(Topology::new(count, leaf_size))
 }
@@ -47,17 +47,17 @@ impl PointHierarchy {
             ("normals", self.arrays.normals.len(), points),
             ("radii", self.arrays.radii.len(), points),
             ("kinds", self.arrays.codes.len(), points),
-            ("source", self.arrays.source.len(), points),
+            ("source indices", self.arrays.source.len(), points),
             ("boxes", self.arrays.siblings.len(), inner),
-            ("growths", self.arrays.surface_growths.len(), inner),
-            ("growths of the obstacle", self.arrays.obstacle_growths.len(), inner),
-            ("leaves", self.arrays.leaf_blocks.len(), leaves * LeafParts::blocks_a_leaf(&self.topology)),
-            ("marks", self.arrays.marks.len(), leaves),
+            ("enclosures", self.arrays.surface_growths.len(), inner),
+            ("enclosures of the obstacle", self.arrays.obstacle_growths.len(), inner),
+            ("leaf blocks", self.arrays.leaf_blocks.len(), leaves * LeafParts::blocks_a_leaf(&self.topology)),
+            ("leaf marks", self.arrays.marks.len(), leaves),
             ("blocks", self.arrays.blocks.len(), blocks),
             ("samples", self.arrays.sample_lists.len(), inner.saturating_mul(self.meta.samples as usize)),
             ("coverings", self.arrays.coverings.len(), self.topology.len()),
             ("groups", self.arrays.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
-            ("lists", self.arrays.lists.len(), blocks),
+            ("neighbour lists", self.arrays.lists.len(), blocks),
         ];
         match expected.into_iter().find(|(_, found, expected)| found != expected) {
             Some((array, found, expected)) => Err(Flaw::Length { array, found, expected }),
@@ -73,10 +73,10 @@ impl PointHierarchy {
         }
         let Aabb { min, max } = self.meta.bounds;
         if !(0..3).all(|k| min[k].is_finite() && max[k].is_finite() && min[k] <= max[k]) {
-            return wrong("the box of bounds");
+            return wrong("the bounding box");
         }
         if !(self.meta.step >= 0.0 && self.meta.step.is_finite()) {
-            return wrong("what rounding cost");
+            return wrong("the rounding error");
         }
         if !(self.meta.sampling_radius > 0.0 && self.meta.sampling_radius <= FARTHEST) {
             return wrong("the sampling radius");
@@ -88,7 +88,7 @@ impl PointHierarchy {
             return wrong("the box of the root");
         }
         if !RADIUS_NEIGHBOURS.contains(&self.meta.radius_neighbours) {
-            return wrong("the number of neighbours for a radius");
+            return wrong("the number of neighbours for local radii");
         }
         if !SAMPLES.contains(&self.meta.samples) {
             return wrong("the number of samples of a node");
@@ -119,7 +119,7 @@ impl PointHierarchy {
         if (self.meta.frame.to_world(low), self.meta.frame.to_world(high))
             != (self.meta.bounds.min, self.meta.bounds.max)
         {
-            return Err(Flaw::Metadata { what: "the box of bounds" });
+            return Err(Flaw::Metadata { what: "the bounding box" });
         }
         let (mut less, mut more) = (0_u32, 0_u32);
         for &r in &self.arrays.radii {

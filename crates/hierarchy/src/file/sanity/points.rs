@@ -122,8 +122,8 @@ const COMPARED: [&str; 6] = [
     "the normal of point",
     "the radius of point",
     "the kind of point",
-    "the place in the input of point",
-    "the box about point",
+    "the source index of point",
+    "the bounding box of point",
 ];
 
 impl Leaf<'_> {

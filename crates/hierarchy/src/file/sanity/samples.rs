@@ -29,11 +29,11 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
 }
 
 fn check_node(scan: &PointHierarchy, id: NodeId) -> Result<(), Flaw> {
-    let (topology, slices, covering) = (scan.topology(), scan.slices(), &scan.arrays.coverings[id.index()]);
+    let (topology, arrays, covering) = (scan.topology(), scan.arrays(), &scan.arrays.coverings[id.index()]);
     let wrong = |what| Err(Flaw::Value { what, index: id.index() });
     let Covering { radius, sampling, spacing } = *covering;
     let lengths = (radius >= 0.0) & (sampling >= 0.0) & (spacing >= 0.0) & (sampling <= radius);
-    if !(lengths & (spacing <= FARTHEST)) || spacing > slices.tree.reach(id) * MEAN {
+    if !(lengths & (spacing <= FARTHEST)) || spacing > arrays.tree.reach(id) * MEAN {
         return wrong("the covering of node");
     }
     if topology.is_leaf(id) {
@@ -47,9 +47,9 @@ fn check_node(scan: &PointHierarchy, id: NodeId) -> Result<(), Flaw> {
     if !(list.iter().all(is_own) && ascends) {
         return wrong("a sample of node");
     }
-    let centres = centres_of(slices.samples(id.index()), scan.positions());
+    let centres = centres_of(arrays.samples(id.index()), scan.positions());
     for child in topology.children(id).iter() {
-        let samples = slices.samples(child.index());
+        let samples = arrays.samples(child.index());
         let away = samples.iter().step_by(STEP).map(|i| centres.nearest_sq(scan.positions()[i]));
         if away.fold(0.0, f32::max).sqrt() > radius {
             return wrong("the covering of node");

@@ -264,12 +264,12 @@ impl Papers<'_, '_> {
             - Vector3::from(self.search.pair.relative.point(self.search.pair.b.position(j)));
         let outwards = if side.distance < 0.0 { -from } else { from };
         let gradient = outwards.try_normalize(0.0).filter(|_| is_far).map_or(normal, Into::into);
-        Slope { place, value: side.distance / self.search.pair.views[0].placed().scale(), gradient }
+        Slope { place, value: side.distance / self.search.pair.views[0].stored_to_world().scale(), gradient }
     }
 
     /// The scale from b's stored frame to the world.
     pub(crate) fn scale_of_b(&self) -> f64 {
-        self.search.pair.views[1].placed().scale()
+        self.search.pair.views[1].stored_to_world().scale()
     }
 
     /// Searches for an intersection on the edge between two points of a with these signed distances
@@ -313,16 +313,17 @@ impl Papers<'_, '_> {
     /// contact if it is.
     fn meets_at(&mut self, i: u32, x: [f64; 3], side: &Side, search: &Interpolation) -> ControlFlow<()> {
         let [va, vb] = self.search.pair.views;
-        let nearest = va.scan().nearest_point_within(i as usize, va.placed().apply_inverse(x), f64::INFINITY);
+        let nearest =
+            va.scan().nearest_point_within(i as usize, va.stored_to_world().apply_inverse(x), f64::INFINITY);
         self.search.pair.meter.spent.neighbour_steps += u64::from(nearest.1);
         let (i, j) = (nearest.0 as usize, side.near as usize);
         let radii = [
-            f64::from(self.search.pair.a.radii[i]) * va.placed().scale(),
+            f64::from(self.search.pair.a.radii[i]) * va.stored_to_world().scale(),
             f64::from(self.search.pair.b.radii[j]) * self.scale_of_b(),
         ];
         let normals = [
-            va.placed().rotate(self.search.pair.a.normals[i].map(f64::from)),
-            vb.placed().rotate(self.search.pair.b.normals[j].map(f64::from)),
+            va.stored_to_world().rotate(self.search.pair.a.normals[i].map(f64::from)),
+            vb.stored_to_world().rotate(self.search.pair.b.normals[j].map(f64::from)),
         ];
         let from = [va.point(i), vb.point(j)].map(|p| Vector3::from(x) - Vector3::from(p));
         // Edges of a cross gaps and lead from sheet to sheet. The side also changes where b ends,
@@ -349,7 +350,7 @@ impl Papers<'_, '_> {
     /// Moves the drawn points that are near b towards it, from nearest point to nearest point,
     /// until the discs there cross or the distance stops shrinking.
     fn draw_all_near(&mut self, most: usize, reach: f32, graph: &SurfaceGraph) -> ControlFlow<()> {
-        let reach = f64::from(reach) * self.search.pair.views[0].placed().scale();
+        let reach = f64::from(reach) * self.search.pair.views[0].stored_to_world().scale();
         let mut near = std::mem::take(&mut self.scratch.interpolation.near);
         near.clear();
         let drawn = self.scratch.interpolation.drawn.points().iter();
@@ -379,7 +380,11 @@ impl Papers<'_, '_> {
         for _ in 0..STEPS {
             self.search.pair.meter.go_on()?;
             let towards = |view: &crate::pair::placed::Placed<'_>, own: u32, x: [f64; 3]| {
-                view.scan().nearest_point_within(own as usize, view.placed().apply_inverse(x), f64::INFINITY)
+                view.scan().nearest_point_within(
+                    own as usize,
+                    view.stored_to_world().apply_inverse(x),
+                    f64::INFINITY,
+                )
             };
             let (next, steps_a) = towards(va, i, vb.point(j as usize));
             let (other, steps_b) = towards(vb, j, va.point(next as usize));

@@ -34,7 +34,7 @@ impl Papers<'_, '_> {
             return ControlFlow::Continue(());
         };
         let (edges, longest) = (graph.points().edges(), graph.points().reaches());
-        let scale = va.placed().scale();
+        let scale = va.stored_to_world().scale();
         let leaf = self.search.pair.a.tree.topology().points(pair.a);
         let volume = self.search.pair.relative.moved(&self.search.pair.b.tree.bounds(pair.b));
         let hint = id32(self.search.pair.b.tree.topology().points(pair.b).start);

@@ -42,7 +42,7 @@ impl Papers<'_, '_> {
         };
         let [va, _] = self.search.pair.views;
         let radii = [
-            f64::from(self.search.pair.a.radii[i]) * va.placed().scale(),
+            f64::from(self.search.pair.a.radii[i]) * va.stored_to_world().scale(),
             f64::from(self.search.pair.b.radii[j]) * self.scale_of_b(),
         ];
         // The sphere about the point between two neighbours contains a common point unless the

@@ -14,9 +14,9 @@ impl Papers<'_, '_> {
     /// The side of a world point; fast if `hint` is a point of b near it.
     pub(crate) fn side_at(&mut self, x: [f64; 3], hint: u32) -> Side {
         let [_, vb] = self.search.pair.views;
-        let local = vb.placed().apply_inverse(x);
+        let local = vb.stored_to_world().apply_inverse(x);
         // Beyond all support radii only the side matters.
-        let reach = f64::from(vb.scan().plan().horizon(self.search.pair.b.sampling_radius));
+        let reach = f64::from(vb.scan().plan().support_radius(self.search.pair.b.sampling_radius));
         let (near, steps) = vb.scan().nearest_point_within(hint as usize, local, reach);
         let meter = &mut self.search.pair.meter;
         meter.spent.neighbour_steps += u64::from(steps);
@@ -25,17 +25,18 @@ impl Papers<'_, '_> {
         let towards = Vector3::from(vb.point(j)) - Vector3::from(x);
         let away = towards.norm();
         let radius = self.search.pair.b.radii[j];
-        let horizon = f64::from(vb.scan().plan().horizon(radius)) * vb.placed().scale();
+        let support_radius =
+            f64::from(vb.scan().plan().support_radius(radius)) * vb.stored_to_world().scale();
         let sure = vb.graph().is_some_and(|graph| graph.confidence()[j] >= CERTAIN);
         let is_known = sure && vb.scan().is_oriented();
-        if away < horizon {
+        if away < support_radius {
             let at = vb.evaluate_near(j, x, &mut self.search.gathers[1]);
             if at.status == Status::Ok {
                 return Side { distance: -at.f, near, away, is_known };
             }
         }
         let normal = Vector3::from(self.search.pair.b.normals[j].map(f64::from));
-        let normal = Vector3::from(vb.placed().rotate(normal.into()));
+        let normal = Vector3::from(vb.stored_to_world().rotate(normal.into()));
         let distance = if normal.dot(&towards) > 0.0 { -away } else { away };
         Side { distance, near, away, is_known }
     }

@@ -30,7 +30,7 @@ const ROUNDS: u32 = 1;
 pub(crate) const LANES: usize = 16;
 
 /// Lower bounds on the distances of sixteen node pairs, minus |o|, in a's stored frame. Equal to
-/// [`Motion::least`] for volumes that may overlap and for NaN.
+/// [`RelativePose::least`] for volumes that may overlap and for NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gaps {
     pub(crate) boxes: [f32; LANES],
@@ -56,7 +56,7 @@ const DOUBLE_ROUNDING: f64 = 2e-15;
 
 /// b's pose in a's stored frame, prepared for [`Self::gaps`].
 #[derive(Debug, Clone)]
-pub(crate) struct Motion {
+pub(crate) struct RelativePose {
     rotation: [[f32; 3]; 3],
     pub(crate) scale: f32,
     /// The translation of b's points, minus o.
@@ -76,7 +76,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
     v.map(|c| c as f32).into()
 }
 
-impl Motion {
+impl RelativePose {
     /// Prepares the relative pose `pose` of two things with the boxes `roots`, whose stored frames
     /// are `placed` in the world.
     #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
@@ -313,7 +313,7 @@ fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>;
 }
 
 #[cfg(test)]
-impl Motion {
+impl RelativePose {
     /// The relative pose `pose` of two scans centred at their origins, with all points within 4 of
     /// them.
     pub(crate) fn of_centred(pose: &Pose) -> Self {
@@ -417,15 +417,15 @@ mod tests {
             let (more_a, more_b) = (growths(), growths());
             let limits = Limits { boxes: 0.1, enclosures: -0.2 };
             let found = levels().into_iter().map(|level| {
-                let motion = Motion::of_centred(&pose);
+                let relative_pose = RelativePose::of_centred(&pose);
                 let gaps = dispatch!(level, simd => {
                     let (a, b) = (four(simd, &a, &more_a), four(simd, &b, &more_b));
-                    motion.gaps(simd, &a.map(spread), &motion.moved(&b).map(repeated), limits)
+                    relative_pose.gaps(simd, &a.map(spread), &relative_pose.moved(&b).map(repeated), limits)
                 });
-                (gaps, motion)
+                (gaps, relative_pose)
             });
             let found: Vec<_> = found.collect();
-            let (gaps, motion) = &found[0];
+            let (gaps, relative_pose) = &found[0];
             assert!(found.iter().all(|other| other.0 == *gaps), "every level: {found:?}");
             for lane in 0..LANES {
                 let (boxes, enclosures) = (gaps.boxes[lane], gaps.enclosures[lane]);
@@ -435,9 +435,9 @@ mod tests {
                 let grown = distance(&more_a[i].of(&a[i]), &more_b[j].of(&b[j]), &pose);
                 let own = distance(&a[i], &b[j], &pose);
                 for ((gap, expected), far) in [(boxes, own), (enclosures, grown)].into_iter().zip(&mut far) {
-                    let bound = motion.bound(gap);
+                    let bound = relative_pose.bound(gap);
                     let what = format!("{bound} for {expected}, round {round}, lane {lane}");
-                    assert!(bound <= expected + motion.slack, "{what}");
+                    assert!(bound <= expected + relative_pose.slack, "{what}");
                     if expected > 0.01 {
                         *far = (far.0 + 1.0, far.1 + bound / expected);
                     }

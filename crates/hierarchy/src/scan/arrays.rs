@@ -1,4 +1,4 @@
-//! [`Slices`]: the arrays of a scan for hot loops, and the parts of points and nodes in the obstacle.
+//! [`ScanArrays`]: the arrays of a scan for hot loops, and the parts of points and nodes in the obstacle.
 
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ type FullBlock<'a> = (&'a [PointCode; PointBlock::WIDTH], &'a [f32; PointBlock::
 /// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not
 /// at every access.
 #[derive(Debug, Clone, Copy)]
-pub struct Slices<'a> {
+pub struct ScanArrays<'a> {
     /// Unit normals; see [`crate::PointHierarchy::normals`].
     pub normals: &'a [[f32; 3]],
     /// Local sampling radii.
@@ -38,7 +38,7 @@ pub struct Slices<'a> {
     /// The points in blocks: see [`crate::PointHierarchy::blocks`].
     pub blocks: &'a [PointBlock],
     /// The samples of the inner nodes in order, [`samples_a_node`](Self::samples_a_node) for each;
-    /// see [`Slices::samples`].
+    /// see [`ScanArrays::samples`].
     pub sample_lists: &'a [u32],
     /// The sphere covering of each node.
     pub coverings: &'a [Covering],
@@ -58,7 +58,7 @@ pub struct Slices<'a> {
     pub dense: usize,
 }
 
-impl Slices<'_> {
+impl ScanArrays<'_> {
     /// Returns the `i`-th position in leaf order.
     ///
     /// # Panics

@@ -10,13 +10,13 @@ use nearmiss_lanes::wide::{Bits, WIDTH, bits, load};
 use super::walk::Walker;
 use super::{BlockTree, Bounds};
 
-/// The result of [`BlockTree::heard`]. Can be reused.
+/// The result of [`BlockTree::overlapping`]. Can be reused.
 #[derive(Debug, Clone, Default)]
-pub struct Heard {
+pub struct Overlaps {
     lists: [Vec<u32>; WIDTH],
 }
 
-impl Heard {
+impl Overlaps {
     /// Returns the points whose balls meet that of the block's point in this lane, ascending. The
     /// point itself is among them if its support radius is positive.
     ///
@@ -39,16 +39,16 @@ impl BlockTree<'_> {
     /// # Panics
     /// If there is no such block.
     #[inline]
-    pub fn heard(&self, level: Level, block: usize, found: &mut Heard) {
+    pub fn overlapping(&self, level: Level, block: usize, found: &mut Overlaps) {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.heard_by(simd, block, found)
+            || self.overlapping_by(simd, block, found)
         ));
     }
 
     #[inline(always)]
-    fn heard_by<S: Simd>(&self, simd: S, block: usize, found: &mut Heard) {
-        let Heard { lists } = found;
+    fn overlapping_by<S: Simd>(&self, simd: S, block: usize, found: &mut Overlaps) {
+        let Overlaps { lists } = found;
         lists.iter_mut().for_each(Vec::clear);
         let own = &self.blocks[block];
         let mut search = Search {
@@ -56,7 +56,7 @@ impl BlockTree<'_> {
             block,
             about: self.bounds(0, block),
             points: load(simd, &own.position),
-            horizons: f32x16::load_array_ref(simd, &own.horizon),
+            support_radii: f32x16::load_array_ref(simd, &own.support_radius),
             present: self.present(block),
             lists,
         };
@@ -67,15 +67,23 @@ impl BlockTree<'_> {
     /// Adds the points of block `id` whose balls meet those of points of `block` to the lists of
     /// the latter, for the given lanes of `block`.
     #[inline(always)]
-    fn listen<S: Simd>(&self, simd: S, block: usize, id: usize, lanes: u32, lists: &mut [Vec<u32>; WIDTH]) {
+    fn add_overlapping<S: Simd>(
+        &self,
+        simd: S,
+        block: usize,
+        id: usize,
+        lanes: u32,
+        lists: &mut [Vec<u32>; WIDTH],
+    ) {
         let own = &self.blocks[block];
         let [x, y, z] = &own.position;
         for lane in Bits(lanes) {
-            let mut heard = [0; WIDTH];
+            let mut overlapping = [0; WIDTH];
             let other = &self.blocks[id];
             let place = [x[lane], y[lane], z[lane]];
-            let count = other.heard(simd, place, own.horizon[lane], id32(id * WIDTH), &mut heard);
-            lists[lane].extend_from_slice(&heard[..count]);
+            let count =
+                other.supporting(simd, place, own.support_radius[lane], id32(id * WIDTH), &mut overlapping);
+            lists[lane].extend_from_slice(&overlapping[..count]);
         }
     }
 }
@@ -86,7 +94,7 @@ struct Search<'a, S: Simd> {
     block: usize,
     about: Bounds,
     points: [f32x16<S>; 3],
-    horizons: f32x16<S>,
+    support_radii: f32x16<S>,
     /// The lanes that have points, as bits.
     present: u32,
     lists: &'a mut [Vec<u32>; WIDTH],
@@ -96,7 +104,7 @@ impl<S: Simd> Search<'_, S> {
     /// Returns the lanes of the points whose balls may meet one in a box, as bits.
     #[inline(always)]
     fn lanes_near(&self, simd: S, bounds: &Bounds) -> u32 {
-        let far = self.horizons + bounds.horizon;
+        let far = self.support_radii + bounds.support_radius;
         bits(bounds.distances_sq(simd, &self.points).simd_lt(far * far)) & self.present
     }
 }
@@ -105,7 +113,7 @@ impl<S: Simd> Walker<S> for Search<'_, S> {
     #[inline(always)]
     fn wanted(&mut self, simd: S, level: usize, group: usize) -> u32 {
         let boxes = &self.tree.levels[level][group];
-        let far = f32x16::load_array_ref(simd, &boxes.horizon) + self.about.horizon;
+        let far = f32x16::load_array_ref(simd, &boxes.support_radius) + self.about.support_radius;
         let near = bits(boxes.distances_sq(simd, &self.about).simd_lt(far * far));
         if level == 0 {
             return near;
@@ -118,7 +126,7 @@ impl<S: Simd> Walker<S> for Search<'_, S> {
     fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
         let lanes = self.lanes_near(simd, &self.tree.bounds(0, id));
         if lanes != 0 {
-            self.tree.listen(simd, self.block, id, lanes, self.lists);
+            self.tree.add_overlapping(simd, self.block, id, lanes, self.lists);
         }
         ControlFlow::Continue(())
     }
