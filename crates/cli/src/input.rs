@@ -148,7 +148,8 @@ impl Opening {
         Ok([first, second])
     }
 
-    /// As [`Self::open`], with a graph, which has these options if it is built here. Fails for a prepared scan without one.
+    /// As [`Self::open`], with a graph, which has these options if it is built here. Fails for a
+    /// prepared scan without one.
     pub(crate) fn open_with_graph(self, path: &Path, options: &GraphOptions) -> Result<Scan, CliError> {
         check_there(path)?;
         if is_prepared(path) {
@@ -205,7 +206,7 @@ pub(crate) fn read(path: &Path, format: Option<Format>, console: Console) -> Res
         let count = count.clone();
         #[expect(clippy::cast_precision_loss, reason = "a rough figure")]
         let share = move |count: u64| expected.map(|expected| count as f64 / expected as f64);
-        move || Told { share: share(count.get()), count: count.get() }
+        move || Told { share: share(count.get()), count: count.get(), may_end_early: false }
     });
     Ok(nearmiss::io::read_watched(path, format, &mut |points| count.add(points as u64))?)
 }

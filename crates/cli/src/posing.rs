@@ -179,7 +179,7 @@ impl PoseProgress {
             let read = self.bytes.get().min(length) as f64 / length as f64;
             read * count as f64 / self.lines.get().max(1) as f64
         });
-        Told { share, count }
+        Told { share, count, may_end_early: false }
     }
 }
 

@@ -35,6 +35,8 @@ pub(crate) struct Told {
     pub(crate) share: Option<f64>,
     /// The number of things that are done.
     pub(crate) count: u64,
+    /// `true` if the step may end before the share is 1.
+    pub(crate) may_end_early: bool,
 }
 
 impl Told {
@@ -48,7 +50,7 @@ impl Told {
             reason = "a rough figure"
         )]
         let count = (share * count as f64) as u64;
-        Self { share: Some(share), count }
+        Self { share: Some(share), count, may_end_early: false }
     }
 }
 
@@ -108,7 +110,8 @@ fn line(what: &str, things: &str, told: Told, seconds: f64) -> String {
         return format!("{what}: {} {things}, {rate}/s, {}", grouped(told.count), duration(seconds));
     };
     let left = if share > 0.0 {
-        format!("{rate} {things}/s, {} left", duration(seconds * (1.0 - share) / share))
+        let most = if told.may_end_early { "at most " } else { "" };
+        format!("{rate} {things}/s, {most}{} left", duration(seconds * (1.0 - share) / share))
     } else {
         duration(seconds)
     };
@@ -174,15 +177,17 @@ mod tests {
 
     #[test]
     fn a_line_has_share_rate_and_time() {
-        let told = Told { share: Some(0.25), count: 250_000 };
+        let told = Told { share: Some(0.25), count: 250_000, may_end_early: false };
         let bar = format!("[{}{}]", "█".repeat(5), "░".repeat(15));
         let expected = format!("preparing {bar} 25 %, 125,000 points/s, 6s left");
         assert_eq!(line("preparing", "points", told, 2.0), expected);
-        let told = Told { share: None, count: 30 };
+        let told = Told { may_end_early: true, ..told };
+        assert!(line("preparing", "points", told, 2.0).ends_with(" points/s, at most 6s left"));
+        let told = Told { count: 30, ..Told::default() };
         assert_eq!(line("answering", "poses", told, 2.0), "answering: 30 poses, 15/s, 2s");
-        let told = Told { share: Some(0.0), count: 0 };
+        let told = Told { share: Some(0.0), ..Told::default() };
         assert!(line("answering", "poses", told, 2.0).ends_with("] 0 %, 2s"));
-        let told = Told { share: Some(1.5), count: 7 };
+        let told = Told { share: Some(1.5), count: 7, may_end_early: false };
         assert!(line("answering", "poses", told, 1.0).ends_with("█] 100 %, 7 poses/s, 0s left"));
     }
 

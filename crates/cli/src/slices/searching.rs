@@ -26,7 +26,7 @@ pub(super) fn watch(
         let count = count.get();
         #[expect(clippy::cast_precision_loss, reason = "a rough figure")]
         let share = most.map(|most| (count as f64 / most).min(MOST));
-        Told { share, count }
+        Told { share, count, may_end_early: true }
     })
 }
 
