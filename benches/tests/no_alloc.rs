@@ -7,7 +7,7 @@ use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
     Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves,
     Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interpolation, ManifoldPoint,
-    Method, Pair, Pose, Scan, Scratch, Semantics, Verdict,
+    Method, Pair, Paths, Pose, Scan, Scratch, Semantics, Verdict,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -76,7 +76,10 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
     let mut poses: Vec<Pose> = poses::near(&object, POSES, 1).unwrap().iter().map(|near| near.pose).collect();
     poses.extend(poses::sweep(POSES / 10, 1, 0).into_iter().flatten());
-    let along = scan.clone().with_graph(&object.cloud, &GraphOptions::default(), None).unwrap();
+    let along = scan
+        .clone()
+        .with_graph(&object.cloud, &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)), None)
+        .unwrap();
     let along = along.with_geodesic_kernel().unwrap();
     let (mut scratch, mut places) = (Scratch::default(), Vec::new());
     for scan in [&scan, &along] {

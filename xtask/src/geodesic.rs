@@ -41,6 +41,5 @@ fn prepared(path: &Path) -> Outcome<Scan> {
         return Ok(Scan::open(path, Check::Structure)?);
     }
     let cloud = nearmiss::io::read(path, None)?.cloud;
-    let options = GraphOptions::default().with_close_pairs(None);
-    Ok(Scan::build(&cloud, &BuildOptions::default())?.with_graph(&cloud, &options, None)?)
+    Ok(Scan::build(&cloud, &BuildOptions::default())?.with_graph(&cloud, &GraphOptions::default(), None)?)
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nearmiss::{BuildOptions, GraphOptions, PointCloud, Pose, Scan};
+use nearmiss::{BuildOptions, GraphOptions, Paths, PointCloud, Pose, Scan};
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
 use nearmiss_testdata::scanner::{self, Frame};
@@ -64,7 +64,7 @@ pub fn shipped() -> Result<Vec<Case>, Failure> {
     let small = Object::read("dragon-5k")?.scaled()?;
     let bumpy = Object::read("bumpy:4000")?.scaled()?;
     let geodesic = prepared(&bumpy.cloud)?
-        .with_graph(&bumpy.cloud, &GraphOptions::default(), None)?
+        .with_graph(&bumpy.cloud, &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)), None)?
         .with_geodesic_kernel()?;
     let hall =
         PointCloud::from_positions(&scanner::frame(&Frame { beams: 32, steps: 900, noise: 0.01, seed: 1 }))?;

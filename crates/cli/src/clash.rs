@@ -8,6 +8,7 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use nearmiss::store::Progress;
 use nearmiss::{Budget, ClashOptions, ClashPlan, Pair, Scan, Scratch};
 
 use crate::console::{Console, Results, now};
@@ -72,17 +73,17 @@ pub(crate) fn run(args: &ClashArgs) -> Result<(), CliError> {
     check_outputs(&outputs, &inputs)?;
     let matrices = args.pair.matrices()?;
     let [a, b] = open(args, console)?;
-    let mut options =
-        ClashOptions::default().with_semantics(args.meaning.semantics(&a)).with_clearance(args.clearance);
-    options.link = args.link;
-    let plan = ClashPlan::new(&options, &a, &b)?;
+    let plan = ClashPlan::new(&options(args, &a), &a, &b)?;
     let [pose_a, pose_b] = posing::of_options(&matrices, [&a, &b])?;
     let [a, b] = [a.at(&pose_a), b.at(&pose_b)];
     args.pair.size_check(console).compare([&a, &b]);
 
     let start = now();
-    let bar = console.spinner("looking for clashes");
-    let found = Pair::new(a, b).clashes(&plan, &mut Scratch::default());
+    let progress = Progress::default();
+    let leaves = a.scan().topology().leaves() + b.scan().topology().leaves();
+    let bar = console.watch_share("looking for clashes", "leaves", &progress, leaves);
+    let found =
+        Pair::new(a, b).clashes_watched(&plan, &mut Scratch::default(), &mut |share| progress.reach(share));
     drop(bar);
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
@@ -100,6 +101,14 @@ pub(crate) fn run(args: &ClashArgs) -> Result<(), CliError> {
         drop(bar);
     }
     tell(&list, args.json, micros)
+}
+
+/// Returns the options of the list. `a` is the first scan.
+pub(crate) fn options(args: &ClashArgs, a: &Scan) -> ClashOptions {
+    let mut options =
+        ClashOptions::default().with_semantics(args.meaning.semantics(a)).with_clearance(args.clearance);
+    options.link = args.link;
+    options
 }
 
 /// Opens both scans. The kernel does not matter for balls about points, so scans prepared for any

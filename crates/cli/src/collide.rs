@@ -27,6 +27,7 @@ use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::search::SearchArgs;
 use crate::sentence::{hint, sentence, unit};
+use crate::threads::pool;
 use crate::units::SizeCheck;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture, proof};
@@ -278,9 +279,11 @@ impl Asked {
             Verdict::Separated { gap, .. } => (PathVerdict::Separated, None, gap),
             Verdict::Undecided(_) => (PathVerdict::Undecided, None, 0.0),
         };
-        let bounds = self.clearance.map(|found| [found.lower.max(gap).min(found.upper), found.upper]);
+        // A search for the distance may find a contact that the method has missed.
+        let found = self.clearance.filter(|found| verdict != PathVerdict::Separated || found.upper > 0.0);
+        let bounds = found.map(|found| [found.lower.max(gap).min(found.upper), found.upper]);
         let clearance = bounds.or(witness.map(|_| [0.0; 2]));
-        let place = witness.or(self.clearance.map(|found| found.points[0]));
+        let place = witness.or(found.map(|found| found.points[0]));
         let (time, micros) = (self.time, self.micros);
         let (evidence, reason) = report.evidence_and_reason();
         PathEntry { line, time, verdict, evidence, reason, clearance, place, micros }
@@ -311,32 +314,17 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
 
     let threads = args.threads.unwrap_or(0);
     let [a, b] = open(args, threads, console)?;
-    let semantics = args.meaning.semantics(&a);
-    let detail = match args.detail {
-        DetailName::Verdict => Detail::Verdict,
-        DetailName::Witness | DetailName::Manifold => Detail::Witness,
-    };
-    let evidence = match args.evidence {
-        None | Some(EvidenceName::Certified) => Evidence::Certified,
-        Some(EvidenceName::Estimated) => Evidence::Estimated,
-    };
-    let options = CollideOptions::default()
-        .with_semantics(semantics)
-        .with_detail(detail)
-        .with_margin(args.margin)
-        .with_evidence(evidence);
-    args.search.check(&a, &b)?;
+    args.search.check([&a, &b], args.pair.inputs())?;
     if args.search.wants_graphs() {
         a.make_ready();
     }
-    let options = args.search.apply(options, &a)?;
-    let plan = CollidePlan::new(&options, &a, &b)?;
+    let plan = CollidePlan::new(&options(args, &a)?, &a, &b)?;
     let prove = args.prove.is_some();
     let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);
     let sizes = args.pair.size_check(console);
     let manifold = args.detail == DetailName::Manifold;
     let wants_clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
-    let distance = DistanceOptions::default().with_semantics(semantics);
+    let distance = DistanceOptions::default().with_semantics(plan.options().semantics);
     let clearance = wants_clearance.then(|| DistancePlan::new(&distance, &a, &b)).transpose()?;
     let question =
         Question { a, b, plan, budget, work, resolution, prove, all: args.all, manifold, clearance, sizes };
@@ -349,7 +337,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
             Some(poses) => {
                 let log = Some(PathLog::new(&args.path, csv)?);
                 let mut out = Outputs { results: &mut results, proof, log };
-                answer_all(&question, poses, args, &mut out)?;
+                answer_all(&question, poses, args, console, &mut out)?;
                 conclude(&question, args, &mut out)
             }
             None => {
@@ -359,6 +347,24 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         })
     })?;
     results.flush()
+}
+
+/// Returns the options of a query. `a` is the first scan.
+pub(crate) fn options(args: &CollideArgs, a: &Scan) -> Result<CollideOptions, CliError> {
+    let detail = match args.detail {
+        DetailName::Verdict => Detail::Verdict,
+        DetailName::Witness | DetailName::Manifold => Detail::Witness,
+    };
+    let evidence = match args.evidence {
+        None | Some(EvidenceName::Certified) => Evidence::Certified,
+        Some(EvidenceName::Estimated) => Evidence::Estimated,
+    };
+    let options = CollideOptions::default()
+        .with_semantics(args.meaning.semantics(a))
+        .with_detail(detail)
+        .with_margin(args.margin)
+        .with_evidence(evidence);
+    args.search.apply(options, a)
 }
 
 /// Writes the summary of the answers along a path, and draws their plot.
@@ -381,7 +387,7 @@ fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2
     }
     let kernel = args.kernel.map(KernelName::metric);
     let scans = if args.search.wants_graphs() && kernel.is_none() {
-        opening.open_both_with_graphs(args.pair.inputs())?
+        opening.open_both_with_graphs(args.pair.inputs(), &args.search.graph_options())?
     } else {
         opening.open_both(kernel, args.pair.inputs())?
     };
@@ -443,8 +449,10 @@ fn answer_all(
     question: &Question,
     poses: &mut PoseFile,
     args: &CollideArgs,
+    console: Console,
     out: &mut Outputs<'_, '_, '_>,
 ) -> Result<(), CliError> {
+    let _watch = poses.watch(console, out.results);
     let threads = args.threads.unwrap_or(1);
     // With one thread, each line is answered before the next is read.
     let (pool, most) = if threads == 1 { (None, 1) } else { (Some(pool(threads)?), BATCH) };
@@ -452,11 +460,12 @@ fn answer_all(
     let mut scratch = BatchScratch::default();
     loop {
         lines.clear();
-        let read = read_lines(poses, most, &mut lines);
+        let read = poses.read_lines(most, &mut lines);
         let ask = |i: usize, scratch: &mut Scratch| {
             let (line, text): &(u64, String) = &lines[i];
             let posed = poses.poses(*line, text, [&question.a, &question.b]);
             let asked = posed.map(|posed| question.ask(Some(*line), posed, scratch));
+            poses.answered();
             // Nothing is written after a fault, or after the first contact with --first.
             let is_last = asked.as_ref().map_or(true, |asked| args.first && asked.is_hit());
             if is_last { ControlFlow::Break(Some(asked)) } else { ControlFlow::Continue(Some(asked)) }
@@ -480,19 +489,4 @@ fn answer_all(
             return Ok(());
         }
     }
-}
-
-fn pool(threads: usize) -> Result<rayon::ThreadPool, CliError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.or(Err(CliError::Threads(threads)))
-}
-
-/// Reads up to `most` lines. After an error, `lines` holds the lines before the faulty one.
-fn read_lines(poses: &mut PoseFile, most: usize, lines: &mut Vec<(u64, String)>) -> Result<(), CliError> {
-    while lines.len() < most
-        && let Some(line) = poses.next_line()?
-    {
-        lines.push(line);
-    }
-    Ok(())
 }

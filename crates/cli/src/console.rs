@@ -3,8 +3,6 @@
 use std::fmt::{self, Display};
 use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
 use std::process::ExitCode;
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -42,9 +40,10 @@ impl Console {
         Bar(bar)
     }
 
-    /// Returns a progress bar for `length` steps; it disappears when dropped.
+    /// Returns a progress bar for `length` steps, with the rate and the time left; it disappears
+    /// when dropped.
     pub(crate) fn steps(self, what: impl Display, length: u64) -> Bar {
-        let bar = self.bar(ProgressBar::new(length), "{msg} [{bar:30}] {pos}/{len} {eta}");
+        let bar = self.bar(ProgressBar::new(length), "{msg} [{bar:20}] {percent} %, {rate}/s, {eta} left");
         bar.set_message(what.to_string());
         Bar(bar)
     }
@@ -58,33 +57,14 @@ impl Console {
         Bar(bar)
     }
 
-    /// Returns a progress bar for work on points, with the rate and the time left; it disappears
-    /// when dropped. `told` returns the share that is done and the number of points.
-    pub(crate) fn share(self, what: impl Display, told: impl Fn() -> (f64, usize) + Send + 'static) -> Watch {
-        const STEPS: f64 = 1000.0;
-        let bar = self.bar(ProgressBar::new(1000), "{msg} [{bar:30}] {percent} %, {eta} left");
-        let (end, ended) = channel();
-        let start = now();
-        let what = what.to_string();
-        let bars = self.bars;
-        let watch = move || {
-            while bars && ended.recv_timeout(Duration::from_millis(200)) == Err(RecvTimeoutError::Timeout) {
-                let (share, points) = told();
-                #[expect(
-                    clippy::cast_precision_loss,
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "a rough figure, at most 1000"
-                )]
-                {
-                    let rate = share * points as f64 / start.elapsed().as_secs_f64();
-                    bar.set_position((STEPS * share) as u64);
-                    bar.set_message(format!("{what}, {} points/s", grouped(rate as u64)));
-                }
-            }
-            bar.finish_and_clear();
-        };
-        Watch { end: Some(end), thread: std::thread::Builder::new().spawn(watch).ok() }
+    /// Returns `true` if bars are shown.
+    pub(crate) fn shows_bars(self) -> bool {
+        self.bars
+    }
+
+    /// Returns a line of text, which is not drawn before its first update.
+    pub(crate) fn line_of_text(self) -> ProgressBar {
+        self.bar(ProgressBar::new_spinner(), "{msg}")
     }
 
     fn bar(self, bar: ProgressBar, template: &str) -> ProgressBar {
@@ -115,23 +95,6 @@ impl Drop for Bar {
     }
 }
 
-/// Progress that a thread updates at intervals.
-#[derive(Debug)]
-pub(crate) struct Watch {
-    /// Ends the thread when dropped.
-    end: Option<Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Drop for Watch {
-    fn drop(&mut self) {
-        self.end = None;
-        if let Some(thread) = self.thread.take() {
-            let _ended = thread.join();
-        }
-    }
-}
-
 /// Prints a warning on standard error.
 pub(crate) fn warn(what: impl Display) {
     let _ = writeln!(io::stderr().lock(), "warning: {what}");
@@ -153,12 +116,43 @@ pub(crate) fn say_error(what: impl Display) {
 /// Standard output, which carries nothing but results.
 #[derive(Debug)]
 pub(crate) struct Results {
-    out: BufWriter<StdoutLock<'static>>,
+    out: BufWriter<Uncovered>,
+}
+
+/// Standard output. A bar is hidden while it is written.
+#[derive(Debug)]
+struct Uncovered {
+    out: StdoutLock<'static>,
+    bar: Option<ProgressBar>,
+}
+
+impl Write for Uncovered {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let Self { out, bar } = self;
+        match bar {
+            Some(bar) => bar.suspend(|| out.write_all(bytes).map(|()| bytes.len())),
+            None => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let Self { out, bar } = self;
+        match bar {
+            Some(bar) => bar.suspend(|| out.flush()),
+            None => out.flush(),
+        }
+    }
 }
 
 impl Results {
     pub(crate) fn new() -> Self {
-        Self { out: BufWriter::with_capacity(1 << 16, io::stdout().lock()) }
+        let out = Uncovered { out: io::stdout().lock(), bar: None };
+        Self { out: BufWriter::with_capacity(1 << 16, out) }
+    }
+
+    /// Hides this bar whenever results are written.
+    pub(crate) fn hide(&mut self, bar: ProgressBar) {
+        self.out.get_mut().bar = Some(bar);
     }
 
     /// Writes a line of text.

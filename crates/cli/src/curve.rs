@@ -115,9 +115,7 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     let [pose_a, pose_b] = posing::of_options(&matrices, [&a, &b])?;
     let [a, b] = [a.at(&pose_a), b.at(&pose_b)];
 
-    let mut options = CurveOptions::default();
-    (options.spacing, options.tolerance) = (args.spacing, args.tolerance);
-    let plan = CurvePlan::new(&options, a.scan(), b.scan())?;
+    let plan = CurvePlan::new(&options(args), a.scan(), b.scan())?;
     let (mut found, mut scratch) = (Curves::default(), Scratch::default());
     let start = now();
     let mut budget = Budget::UNLIMITED;
@@ -147,6 +145,13 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
         drop(bar);
     }
     tell(&found, missed.as_ref(), [&a, &b], micros, args.json)
+}
+
+/// Returns the options of a query.
+pub(crate) fn options(args: &CurveArgs) -> CurveOptions {
+    let mut options = CurveOptions::default();
+    (options.spacing, options.tolerance) = (args.spacing, args.tolerance);
+    options
 }
 
 /// Writes the points in the world frame, each with the number of its curve, and the edges.

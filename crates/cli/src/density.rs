@@ -11,8 +11,8 @@ use std::path::PathBuf;
 use clap::Args;
 use nearmiss::query::points_for;
 use nearmiss::{
-    CollideOptions, CollidePlan, Density, Detail, Interpolation, Method, Pair, Pose, Scan, Scratch,
-    SurfelSize,
+    CollideOptions, CollidePlan, Density, Detail, GraphOptions, Interpolation, Method, Pair, Pose, Scan,
+    Scratch, SurfelSize,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -23,6 +23,7 @@ use crate::error::CliError;
 use crate::input::{self, Opening};
 use crate::poses;
 use crate::preprocess::parse_threads;
+use crate::threads::pool;
 
 /// Options of `density`.
 #[derive(Debug, Clone, Args)]
@@ -90,13 +91,12 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
         );
         return Err(CliError::Usage(what));
     }
-    let scan = Opening::new(true, console).open_with_graph(&args.a)?;
+    let scan = Opening::new(true, console).open_with_graph(&args.a, &GraphOptions::default())?;
     let base = poses::normalised(&scan).ok_or_else(|| CliError::UnsuitableFile {
         path: args.a.clone(),
         what: "expected a scan with an extent, got points at one place only".into(),
     })?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.or(Err(CliError::Threads(args.threads)))?;
+    let pool = pool(args.threads)?;
     let poses: Vec<Pose> = poses::sweep(args.per_distance, args.seed, &base).collect();
     let bar = console.steps("measuring", u64::from(FINEST.ilog2()) * poses.len() as u64);
     let tests = Tests { scan: &scan, base: &base, poses: &poses, bar: &bar };

@@ -10,7 +10,7 @@ use nearmiss::{
 use serde::Serialize;
 
 use crate::console::{Console, Results, now};
-use crate::digits::{rough, work};
+use crate::digits::{rough, short, work};
 use crate::distance_picture::paint_distance;
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -124,15 +124,15 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     } else {
         opening.open_both(args.kernel.map(KernelName::metric), inputs)?
     };
-    let semantics = args.meaning.semantics(&a);
-    let options = DistanceOptions::default().with_semantics(semantics).with_relative(args.relative);
-    let plan = DistancePlan::new(&options, &a, &b)?;
+    let plan = DistancePlan::new(&options(args, &a), &a, &b)?;
     let question = Question { scans: [&a, &b], plan, args, sizes: args.pair.size_check(console) };
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
             let mut log = PathLog::new(&args.path, csv)?;
+            let watch = poses.watch(console, &mut results);
             question.answer_all(poses, &mut log, &mut results)?;
+            drop(watch);
             log.draw(&args.path, &names(inputs), 0.0)?;
             let unit = a.sampling_radius().min(b.sampling_radius()) / 100.0;
             if args.json { Ok(()) } else { results.line(log.summary(unit, 0.0)) }
@@ -143,6 +143,11 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
         }
     }
     results.flush()
+}
+
+/// Returns the options of a query. `a` is the first scan.
+pub(crate) fn options(args: &DistanceArgs, a: &Scan) -> DistanceOptions {
+    DistanceOptions::default().with_semantics(args.meaning.semantics(a)).with_relative(args.relative)
 }
 
 impl Question<'_> {
@@ -156,8 +161,10 @@ impl Question<'_> {
         while let Some((line, text)) = poses.next_line()? {
             // Answers to the lines before a faulty one are written before the error.
             let read = poses.poses(line, &text, self.scans);
-            let Posed { poses, time } = read.or_else(|fault| results.flush().and(Err(fault)))?;
-            let (found, micros) = self.answer(Some(line), &poses, &mut scratch, results)?;
+            let Posed { poses: poses_of_line, time } =
+                read.or_else(|fault| results.flush().and(Err(fault)))?;
+            let (found, micros) = self.answer(Some(line), &poses_of_line, &mut scratch, results)?;
+            poses.answered();
             let verdict = if found.upper <= 0.0 { PathVerdict::Intersecting } else { PathVerdict::Separated };
             let (clearance, place) = (Some([found.lower, found.upper]), Some(found.points[0]));
             let (evidence, reason) = (Some(word(found.evidence)), None);
@@ -196,7 +203,7 @@ impl Question<'_> {
             results.json(&report(&found, micros))?;
             return Ok((found, micros));
         }
-        let sentence = sentence(&found, [&a, &b], self.plan.options().semantics);
+        let sentence = sentence(&found, [&a, &b], self.plan.options());
         if let Some(line) = line {
             results.line(format_args!("line {line}: {sentence}"))?;
             return Ok((found, micros));
@@ -237,7 +244,8 @@ fn report(found: &Distance, micros: f64) -> DistanceReport {
 }
 
 /// Returns the distance as a sentence.
-fn sentence(found: &Distance, views: [&Placed<'_>; 2], semantics: Semantics) -> String {
+fn sentence(found: &Distance, views: [&Placed<'_>; 2], options: &DistanceOptions) -> String {
+    let semantics = options.semantics;
     let unfinished =
         if found.complete { "" } else { " The budget ran out; raise --budget or --work for tighter bounds." };
     if found.upper <= 0.0 {
@@ -251,11 +259,28 @@ fn sentence(found: &Distance, views: [&Placed<'_>; 2], semantics: Semantics) -> 
     match semantics {
         Semantics::Thickened(_) => format!("They are {bracket}.{unfinished}"),
         _ => format!(
-            "They are {bracket} ({}), accurate to the local spacing of {}.{unfinished}",
+            "They are {bracket} ({}), accurate to the local spacing of {}.{}{unfinished}",
             word(found.evidence),
-            rough(found.band)
+            rough(found.band),
+            limited(found, options).unwrap_or_default()
         ),
     }
+}
+
+/// Returns a sentence if the spacing of the scans keeps the bounds further apart than
+/// [`DistanceOptions::relative`].
+fn limited(found: &Distance, options: &DistanceOptions) -> Option<String> {
+    /// Allowance for rounding in the search.
+    const ROUNDING: f64 = 1e-6;
+    let apart = found.upper - found.lower;
+    let is_met = apart <= (options.relative + ROUNDING) * found.upper;
+    (options.semantics == Semantics::Obstacle && found.complete && !is_met).then(|| {
+        format!(
+            " The bounds stay {} apart, more than the {} % of --relative, because of this spacing.",
+            rough(apart),
+            short(100.0 * options.relative)
+        )
+    })
 }
 
 /// Returns the distance of two scans, found within a budget, to state it with a separation.

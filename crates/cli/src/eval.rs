@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use nearmiss::graph::{GeodesicKernel, KernelScratch};
-use nearmiss::{Evaluation, Metric, Placed, Pose, Scan, Scratch, Status};
+use nearmiss::{Evaluation, GraphOptions, Metric, Paths, Placed, Pose, Scan, Scratch, Status};
 use serde::Serialize;
 
 use crate::console::{Console, Results};
 use crate::digits::{place, short};
 use crate::error::CliError;
-use crate::input::{self, Opening, TextLines, pieces};
+use crate::input::{self, Opening, TextLines, pieces, prepare_again};
 
 /// Options of `eval`.
 #[derive(Debug, Clone, Args)]
@@ -78,7 +78,10 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     let opening = Opening::new(args.verify, Console::new(false));
     let scan = match args.kernel {
         None | Some(KernelName::Euclidean) => opening.open(&args.file)?,
-        Some(KernelName::Geodesic) => opening.open_with_graph(&args.file)?,
+        Some(KernelName::Geodesic) => {
+            let options = GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt));
+            opening.open_with_graph(&args.file, &options)?
+        }
     };
     let unit = scan.sampling_radius() / 100.0;
     let kernel = kernel(&scan, args)?;
@@ -115,9 +118,11 @@ fn kernel<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<Option<GeodesicKernel<'
         Metric::Euclidean => Ok(None),
         Metric::Geodesic => {
             let missing = || {
-                let what = "expected a scan with close pairs for the geodesic kernel, got one without; prepare it \
-                            again with `--close-pairs`";
-                CliError::UnsuitableFile { path: args.file.clone(), what: what.into() }
+                let what = format!(
+                    "expected a scan with close pairs for the geodesic kernel, got one without; {}",
+                    prepare_again(&args.file, "--close-pairs")
+                );
+                CliError::UnsuitableFile { path: args.file.clone(), what }
             };
             scan.geodesic_kernel().ok_or_else(missing).map(Some)
         }

@@ -8,11 +8,11 @@ use nearmiss::geometry::Frame;
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::graph::{ClosePairs, PointGraph};
 use nearmiss::io::{Column, PlyError, PlyPoints};
-use nearmiss::{Scan, SurfaceGraph};
+use nearmiss::{GraphOptions, Paths, Scan, SurfaceGraph};
 
 use crate::console::Console;
 use crate::error::CliError;
-use crate::input::Opening;
+use crate::input::{Opening, prepare_again};
 use crate::kinds_picture::{self, colour};
 use crate::viewpoint::ViewArgs;
 use crate::{digits, output, picture, report};
@@ -88,15 +88,17 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     }
     let opening = Opening::new(args.verify, Console::new(args.quiet));
     let scan = if args.edges.is_some() || args.close_pairs.is_some() {
-        opening.open_with_graph(&args.file)?
+        let pairs = args.close_pairs.as_ref().map(|_| Paths::Rebuilt);
+        opening.open_with_graph(&args.file, &GraphOptions::default().with_close_pairs(pairs))?
     } else {
         opening.open(&args.file)?
     };
     let pairs = scan.graph().and_then(SurfaceGraph::close_pairs);
     // Checked before anything is written.
     if args.close_pairs.is_some() && pairs.is_none() {
-        let what = "expected a scan with close pairs, got one without; prepare it again with `--close-pairs`";
-        return Err(CliError::UnsuitableFile { path: args.file.clone(), what: what.into() });
+        let remedy = prepare_again(&args.file, "--close-pairs");
+        let what = format!("expected a scan with close pairs, got one without; {remedy}");
+        return Err(CliError::UnsuitableFile { path: args.file.clone(), what });
     }
     let console = Console::new(args.quiet);
     let wrote = |count: usize, what: &str, path: &Path| {

@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use nearmiss::io::{Format, Model, glance};
-use nearmiss::{BuildOptions, Check, GraphOptions, Metric, Scan};
+use nearmiss::store::Progress;
+use nearmiss::{BuildOptions, Check, GraphOptions, Metric, Paths, Scan, Workspace};
 
 use crate::console::{self, Console};
 use crate::digits::short;
 use crate::error::CliError;
 use crate::estimate;
 use crate::guarded::ReadingLimit;
+use crate::progress::{Counter, Told, short_name};
 
 /// The first bytes of a prepared scan. They do not change if a transfer translates line ends.
 const MAGIC: &[u8] = b"\x8Enmiss";
@@ -79,28 +81,37 @@ impl Opening {
             let scan = Scan::open(path, check).map_err(CliError::loading(path))?;
             return match kernel.filter(|kernel| *kernel != scan.metric()) {
                 Some(kernel) => {
-                    let (path, stored) = (path.display(), scan.metric());
+                    let (name, stored) = (path.display(), scan.metric());
+                    let remedy = prepare_again(path, &format!("--kernel {kernel}"));
                     let what = format!(
-                        "{path}: expected a scan prepared for the {kernel} kernel, got one for the {stored} kernel; \
-                         prepare it again with `--kernel {kernel}`, or the other scan with `--kernel {stored}`"
+                        "{name}: expected a scan prepared for the {kernel} kernel, got one for the {stored} kernel; \
+                         {remedy}, or the other scan with `--kernel {stored}`"
                     );
                     Err(CliError::Usage(what))
                 }
                 None => Ok(scan),
             };
         }
-        let bar = self.console.spinner(format_args!("reading {}", path.display()));
-        let model = read(path, None)?;
-        drop(bar);
-        let _bar = self.console.spinner(format_args!("preparing {}", path.display()));
-        let scan = build(path, &model, &BuildOptions::default().with_threads(self.threads))?;
         match kernel {
-            None | Some(Metric::Euclidean) => Ok(scan),
+            None | Some(Metric::Euclidean) => Ok(self.prepare(path)?.0),
             Some(Metric::Geodesic) => {
-                let scan = with_graph(path, scan, &model, &GraphOptions::default(), None)?;
-                with_geodesic_kernel(path, scan)
+                let options = GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt));
+                with_geodesic_kernel(path, self.prepare_with_graph(path, &options)?, self.console)
             }
         }
+    }
+
+    /// Prepares a raw input with default options. Returns the scan and the input.
+    fn prepare(self, path: &Path) -> Result<(Scan, Model), CliError> {
+        let model = read(path, None, self.console)?;
+        let options = BuildOptions::default().with_threads(self.threads);
+        Ok((build(path, &model, &options, self.console)?, model))
+    }
+
+    /// Prepares a raw input with default options and a graph.
+    fn prepare_with_graph(self, path: &Path, options: &GraphOptions) -> Result<Scan, CliError> {
+        let (scan, model) = self.prepare(path)?;
+        with_graph(path, scan, &model, (options, None), self.console)
     }
 
     /// Opens two scans for the same kernel: the one given, or that of the first prepared scan. If
@@ -126,40 +137,52 @@ impl Opening {
         Ok([first, second])
     }
 
-    /// As [`Self::open_points`], and builds graphs for raw inputs.
-    pub(crate) fn open_both_with_graphs(self, [a, b]: [&Path; 2]) -> Result<[Scan; 2], CliError> {
+    /// As [`Self::open_points`], and builds graphs with these options for raw inputs.
+    pub(crate) fn open_both_with_graphs(
+        self,
+        [a, b]: [&Path; 2],
+        options: &GraphOptions,
+    ) -> Result<[Scan; 2], CliError> {
         let open = |path: &Path| {
-            if is_prepared(path) {
-                return self.open(path);
-            }
-            let model = read(path, None)?;
-            let scan = build(path, &model, &BuildOptions::default().with_threads(self.threads))?;
-            with_graph(path, scan, &model, &GraphOptions::default(), None)
+            check_there(path)?;
+            if is_prepared(path) { self.open(path) } else { self.prepare_with_graph(path, options) }
         };
         let first = open(a)?;
         let second = if a == b { first.clone() } else { open(b)? };
         Ok([first, second])
     }
 
-    /// As [`Self::open`], with a graph. Fails for a prepared scan without one.
-    pub(crate) fn open_with_graph(self, path: &Path) -> Result<Scan, CliError> {
+    /// As [`Self::open`], with a graph, which has these options if it is built here. Fails for a
+    /// prepared scan without one.
+    pub(crate) fn open_with_graph(self, path: &Path, options: &GraphOptions) -> Result<Scan, CliError> {
+        check_there(path)?;
         if is_prepared(path) {
             let scan = self.open(path)?;
             if scan.graph().is_none() {
-                let what = "expected a scan with a graph, got one without; prepare it again with `--graph`";
-                return Err(CliError::UnsuitableFile { path: path.to_owned(), what: what.into() });
+                let what = format!(
+                    "expected a scan with a graph, got one without; {}",
+                    prepare_again(path, "--graph")
+                );
+                return Err(CliError::UnsuitableFile { path: path.to_owned(), what });
             }
             return Ok(scan);
         }
-        let model = read(path, None)?;
-        let scan = build(path, &model, &BuildOptions::default())?;
-        with_graph(path, scan, &model, &GraphOptions::default(), None)
+        self.prepare_with_graph(path, options)
     }
 }
 
+/// Returns the remedy for a prepared scan that lacks what `option` of `preprocess` adds.
+pub(crate) fn prepare_again(path: &Path, option: &str) -> String {
+    format!("prepare it again with `nearmiss preprocess INPUT -o {} {option}`", path.display())
+}
+
 /// Returns the scan, changed to the geodesic kernel.
-pub(crate) fn with_geodesic_kernel(path: &Path, scan: Scan) -> Result<Scan, CliError> {
-    scan.with_geodesic_kernel().map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
+pub(crate) fn with_geodesic_kernel(path: &Path, scan: Scan, console: Console) -> Result<Scan, CliError> {
+    let progress = Progress::default();
+    let name = short_name(path);
+    let _bar = console.watch_points(format_args!("fitting {name} along its graph"), &progress, scan.len());
+    scan.with_geodesic_kernel_watched(&progress)
+        .map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
 }
 
 /// Returns the scan with a proximity graph of its points.
@@ -167,18 +190,29 @@ pub(crate) fn with_graph(
     path: &Path,
     scan: Scan,
     model: &Model,
-    options: &GraphOptions,
-    scanner: Option<[f64; 3]>,
+    (options, scanner): (&GraphOptions, Option<[f64; 3]>),
+    console: Console,
 ) -> Result<Scan, CliError> {
-    scan.with_graph(&model.cloud, options, scanner)
+    let progress = Progress::default();
+    let name = short_name(path);
+    let _bar = console.watch_points(format_args!("building the graph of {name}"), &progress, scan.len());
+    scan.with_graph_watched(&model.cloud, options, scanner, &progress)
         .map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
 }
 
 /// Reads a raw input.
-pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliError> {
+pub(crate) fn read(path: &Path, format: Option<Format>, console: Console) -> Result<Model, CliError> {
     check_raw(path)?;
     let _limit = limit_reading(path, format);
-    Ok(nearmiss::io::read(path, format)?)
+    let expected = glance(path, format).map(|seen| seen.points).filter(|&points| points > 0);
+    let count = Counter::default();
+    let _bar = console.watch(format_args!("reading {}", short_name(path)), "points", {
+        let count = count.clone();
+        #[expect(clippy::cast_precision_loss, reason = "a rough figure")]
+        let share = move |count: u64| expected.map(|expected| count as f64 / expected as f64);
+        move || Told { share: share(count.get()), count: count.get(), may_end_early: false }
+    });
+    Ok(nearmiss::io::read_watched(path, format, &mut |points| count.add(points as u64))?)
 }
 
 /// Limits the memory that a child process may use to read a file.
@@ -208,9 +242,18 @@ pub(crate) fn check_raw(path: &Path) -> Result<(), CliError> {
 }
 
 /// Prepares a model, and warns if its points represent the input badly.
-pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Result<Scan, CliError> {
-    let scan = Scan::build(&model.cloud, options)
-        .map_err(|cause| CliError::Build { path: path.to_owned(), cause })?;
+pub(crate) fn build(
+    path: &Path,
+    model: &Model,
+    options: &BuildOptions,
+    console: Console,
+) -> Result<Scan, CliError> {
+    let work = Workspace::in_memory();
+    let name = short_name(path);
+    let bar = console.watch_points(format_args!("preparing {name}"), work.progress(), model.cloud.len());
+    let scan = Scan::build_in(&(&model.cloud).into(), options, &work);
+    drop(bar);
+    let scan = scan.map_err(|cause| CliError::Build { path: path.to_owned(), cause })?;
     check_step(path, &scan);
     let radius = scan.sampling_radius();
     let share = share_of_long_faces(model, LONG * radius);
@@ -271,6 +314,10 @@ pub(crate) struct TextLines {
     path: PathBuf,
     reader: BufReader<Box<dyn Read + Send + Sync>>,
     number: u64,
+    /// The bytes that were read so far.
+    read: u64,
+    /// The bytes of the file, if it is one.
+    length: Option<u64>,
 }
 
 impl std::fmt::Debug for TextLines {
@@ -283,13 +330,25 @@ impl std::fmt::Debug for TextLines {
 impl TextLines {
     /// Opens a file, or standard input for `-`.
     pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
-        let (path, source): (_, Box<dyn Read + Send + Sync>) = if path == Path::new("-") {
-            ("standard input".into(), Box::new(std::io::stdin()))
+        let (path, length, source): (_, _, Box<dyn Read + Send + Sync>) = if path == Path::new("-") {
+            ("standard input".into(), None, Box::new(std::io::stdin()))
         } else {
             check_there(path)?;
-            (path.to_owned(), Box::new(File::open(path).map_err(CliError::reading(path))?))
+            let file = File::open(path).map_err(CliError::reading(path))?;
+            let length = file.metadata().ok().filter(|about| about.is_file()).map(|about| about.len());
+            (path.to_owned(), length, Box::new(file))
         };
-        Ok(Self { path, reader: BufReader::with_capacity(1 << 16, source), number: 0 })
+        Ok(Self { path, reader: BufReader::with_capacity(1 << 16, source), number: 0, read: 0, length })
+    }
+
+    /// Returns the number of bytes that were read so far.
+    pub(crate) fn bytes_read(&self) -> u64 {
+        self.read
+    }
+
+    /// Returns the length of the file in bytes; `None` for standard input and pipes.
+    pub(crate) fn length(&self) -> Option<u64> {
+        self.length
     }
 
     /// Returns the number of the next line that is not blank, counted from 1, and its text.
@@ -302,6 +361,7 @@ impl TextLines {
             if length == 0 {
                 return Ok(None);
             }
+            self.read += length as u64;
             if length as u64 == LONGEST_LINE {
                 return Err(self.fault(
                     "expected lines of less than 1 MiB, got a longer one; check that this is a text file",

@@ -32,6 +32,8 @@ mod path_entry;
 mod path_plot;
 mod pose_text;
 mod posing;
+mod progress;
+mod threads;
 mod units;
 
 mod advice;
@@ -56,6 +58,9 @@ mod marks;
 mod no_curve;
 mod picture;
 mod viewpoint;
+
+#[cfg(test)]
+mod defaults;
 
 use std::ffi::OsString;
 use std::iter;

@@ -71,6 +71,8 @@ pub(crate) struct PathLog<'a> {
     first: Option<PathEntry>,
     /// The separated pose with the smallest clearance.
     least: Option<PathEntry>,
+    /// The number of separated poses without a known clearance, and the line of the first one.
+    unknown: (u64, u64),
 }
 
 impl<'a> PathLog<'a> {
@@ -78,7 +80,7 @@ impl<'a> PathLog<'a> {
     pub(crate) fn new(args: &PathArgs, csv: Option<&'a mut (dyn Write + 'a)>) -> Result<Self, CliError> {
         let csv = args.csv.clone().zip(csv);
         let kept = args.plot.is_some().then(Vec::new);
-        let mut log = Self { csv, kept, counts: [0; 3], first: None, least: None };
+        let mut log = Self { csv, kept, counts: [0; 3], first: None, least: None, unknown: (0, 0) };
         log.write("line,time,verdict,evidence,reason,clearance_lower,clearance_upper,x,y,z,micros")?;
         Ok(log)
     }
@@ -102,6 +104,10 @@ impl<'a> PathLog<'a> {
             && upper(&entry) < self.least.as_ref().map_or(f64::INFINITY, upper)
         {
             self.least = Some(entry);
+        }
+        if entry.verdict == PathVerdict::Separated && entry.clearance.is_none() {
+            let (count, first) = self.unknown;
+            self.unknown = (count + 1, if count == 0 { entry.line } else { first });
         }
         if let Some(kept) = &mut self.kept {
             kept.push(entry);
@@ -140,6 +146,13 @@ impl<'a> PathLog<'a> {
         if let Some(PathEntry { clearance: Some(bounds), .. }) = &self.least {
             let where_found = self.least.as_ref().map(|least| least.where_found(unit)).unwrap_or_default();
             text += &format!(" Smallest clearance of those apart: {}, on {where_found}.", between(*bounds));
+        }
+        if let (unknown @ 1.., line) = self.unknown {
+            text += &format!(
+                " No clearance is known for {} apart (first on line {line}): a search for the distance finds contact \
+                 there.",
+                count(unknown, "pose")
+            );
         }
         text
     }

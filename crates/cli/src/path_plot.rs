@@ -162,7 +162,8 @@ impl Drawing {
 
     /// Draws the range between the bounds of the clearance, and its upper bound as a line.
     fn clearance(&mut self, axes: &Axes, columns: &[Column]) {
-        for run in columns.chunk_by(|one, next| one.clearance.is_some() && next.clearance.is_some()) {
+        let runs = columns.chunk_by(|one, next| one.clearance.is_some() && next.clearance.is_some());
+        for run in runs.filter(|run| run[0].clearance.is_some()) {
             let corners = |k: usize| {
                 run.iter().filter_map(move |column| {
                     let middle = 0.5 * (column.from + column.to);

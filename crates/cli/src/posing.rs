@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nearmiss::{Pose, PoseError, Scan};
 
-use crate::console::Console;
+use crate::console::{Console, Results};
 use crate::error::CliError;
 use crate::input::{Opening, TextLines, pieces};
 use crate::matrix::{Matrix, PoseRefused};
 use crate::pose_text::{self, FILE_FORMS, FORMS, PoseFormat};
+use crate::progress::{Counter, Told, Watch};
 use crate::units::{SizeCheck, UnitName, WorldUnit, scaled};
 
 /// Two scans, and where they are.
@@ -156,11 +157,50 @@ pub(crate) struct PoseFile {
     fixed: [Option<Matrix>; 2],
     /// The units of both scans in metres.
     factors: [f64; 2],
+    progress: PoseProgress,
+}
+
+/// The progress of answers to a file of poses.
+#[derive(Debug, Clone, Default)]
+struct PoseProgress {
+    /// The lines and the bytes that were read so far.
+    lines: Counter,
+    bytes: Counter,
+    /// The lines that were answered.
+    answered: Counter,
+}
+
+impl PoseProgress {
+    /// Returns the progress in a file of `length` bytes, if that is known. The number of all lines
+    /// is estimated from the length of the lines so far.
+    fn told(&self, length: Option<u64>) -> Told {
+        let count = self.answered.get();
+        #[expect(clippy::cast_precision_loss, reason = "a rough figure")]
+        let share = length.map(|length| {
+            let read = self.bytes.get().min(length) as f64 / length as f64;
+            read * count as f64 / self.lines.get().max(1) as f64
+        });
+        Told { share, count, may_end_early: false }
+    }
 }
 
 impl PoseFile {
     fn open(path: &Path, fixed: [Option<Matrix>; 2], factors: [f64; 2]) -> Result<Self, CliError> {
-        Ok(Self { lines: TextLines::open(path)?, format: None, is_empty: true, fixed, factors })
+        let (lines, progress) = (TextLines::open(path)?, PoseProgress::default());
+        Ok(Self { lines, format: None, is_empty: true, fixed, factors, progress })
+    }
+
+    /// Shows the progress of answers until the result is dropped. `results` are printed above it.
+    pub(crate) fn watch(&self, console: Console, results: &mut Results) -> Watch {
+        let (progress, length) = (self.progress.clone(), self.lines.length().filter(|&length| length > 0));
+        let watch = console.watch("answering", "poses", move || progress.told(length));
+        results.hide(watch.bar());
+        watch
+    }
+
+    /// Counts an answered line.
+    pub(crate) fn answered(&self) {
+        self.progress.answered.add(1);
     }
 
     /// Returns the next line with poses, and its number, counted from 1. Lines that start with `#` are
@@ -185,8 +225,20 @@ impl PoseFile {
                 }
             }
             self.is_empty = false;
+            self.progress.lines.add(1);
+            self.progress.bytes.set(self.lines.bytes_read());
             return Ok(Some((number, text)));
         }
+    }
+
+    /// Reads up to `most` lines. After an error, `lines` holds the lines before the faulty one.
+    pub(crate) fn read_lines(&mut self, most: usize, lines: &mut Vec<(u64, String)>) -> Result<(), CliError> {
+        while lines.len() < most
+            && let Some(line) = self.next_line()?
+        {
+            lines.push(line);
+        }
+        Ok(())
     }
 
     /// Parses the poses on line `number`, whose text is `text`.
@@ -211,5 +263,22 @@ impl PoseFile {
         let placed = pose(0).and_then(|a| Ok([a, pose(1)?]));
         let poses = placed.map_err(|what| self.lines.fault_on(number, what))?;
         Ok(Posed { poses, time: row.time })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_poses_is_estimated_from_the_length_of_lines() {
+        let progress = PoseProgress::default();
+        assert_eq!(progress.told(Some(1000)).share, Some(0.0));
+        progress.lines.add(20);
+        progress.bytes.set(200);
+        progress.answered.add(5);
+        let told = progress.told(Some(1000));
+        assert_eq!((told.share, told.count), (Some(0.05), 5), "5 of about 100");
+        assert_eq!(progress.told(None).share, None, "standard input");
     }
 }

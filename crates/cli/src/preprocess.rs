@@ -7,23 +7,21 @@ mod outcome;
 use nearmiss::Workspace;
 
 use crate::console::{Console, now};
-use crate::digits::count;
 use crate::error::CliError;
 use crate::estimate::{Forecast, Preparation};
 use crate::eval::KernelName;
 use crate::input;
 use crate::output;
 use crate::report::ScanReport;
-use args::{graph_options, options};
+use crate::threads::pool;
 use outcome::{Seconds, save, tell};
 
 pub use args::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, WeightName};
-pub(crate) use args::{parse_format, parse_threads};
+pub(crate) use args::{graph_options, options, parse_format, parse_threads};
 
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;
     let console = Console::new(args.quiet);
-    let name = args.input.display();
 
     let forecast = forecast(args, console);
     let is_announced = match foresee(args, &forecast)? {
@@ -33,9 +31,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     // Removes the files of a killed run on disk.
     Workspace::clear(&output::work_folder(&args.output));
     let start = now();
-    let bar = console.spinner(format_args!("reading {name}"));
-    let mut model = input::read(&args.input, args.format.0)?;
-    drop(bar);
+    let mut model = input::read(&args.input, args.format.0, console)?;
     let filtered = args.filters.apply(&args.input, &mut model.cloud, args.threads, console)?;
     let read = start.elapsed().as_secs_f64();
     let points = model.cloud.len() as u64;
@@ -45,26 +41,18 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     }
 
     let start = now();
-    let bar = console.spinner(format_args!("preparing {}", count(model.cloud.len() as u64, "point")));
-    let scan = input::build(&args.input, &model, &options(args))?;
-    drop(bar);
+    let scan = input::build(&args.input, &model, &options(args), console)?;
     let hierarchy = start.elapsed().as_secs_f64();
 
     let start = now();
     let scan = match graph_options(args) {
-        Some((options, scanner)) => {
-            let _bar =
-                console.spinner(format_args!("building the graph of {}", count(scan.len() as u64, "point")));
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-            let pool = pool.or(Err(CliError::Threads(args.threads)))?;
-            pool.install(|| {
-                let scan = input::with_graph(&args.input, scan, &model, &options, scanner)?;
-                match args.kernel {
-                    KernelName::Euclidean => Ok(scan),
-                    KernelName::Geodesic => input::with_geodesic_kernel(&args.input, scan),
-                }
-            })?
-        }
+        Some((options, scanner)) => pool(args.threads)?.install(|| {
+            let scan = input::with_graph(&args.input, scan, &model, (&options, scanner), console)?;
+            match args.kernel {
+                KernelName::Euclidean => Ok(scan),
+                KernelName::Geodesic => input::with_geodesic_kernel(&args.input, scan, console),
+            }
+        })?,
         None => scan,
     };
     let graph = start.elapsed().as_secs_f64();

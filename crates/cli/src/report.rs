@@ -382,7 +382,7 @@ impl AnswerReport {
             Verdict::Separated { gap, evidence } => {
                 report.verdict = "separated";
                 report.evidence = Some(word(evidence));
-                report.gap = Some(gap);
+                report.gap = (evidence == Evidence::Certified).then_some(gap);
             }
             Verdict::Undecided(reason) => {
                 report.reason = match reason {

@@ -1,11 +1,15 @@
 //! The search options of `collide`: methods, orders and resolution.
 
+use std::path::Path;
+
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Brackets, CollideOptions, Interpolation, Method, Order, Refinement, Sampling, Scan, SurfelSize,
+    Brackets, CollideOptions, GraphOptions, Interpolation, Method, Order, Paths, Refinement, Sampling, Scan,
+    SurfelSize,
 };
 
 use crate::error::CliError;
+use crate::input::prepare_again;
 use crate::parse::parse_radius;
 
 /// Options of `collide` that control the search.
@@ -66,7 +70,8 @@ pub enum MethodName {
     Traversal,
     /// By random test points (Klein & Zachmann 2004, section 5.3); slower, not exhaustive
     Sampling,
-    /// By searches along the proximity graph of a (Klein & Zachmann 2005); with --flat not exhaustive
+    /// By searches along the proximity graphs of both scans, which `preprocess --graph` adds
+    /// (Klein & Zachmann 2005); with --flat not exhaustive
     Interpolation,
 }
 
@@ -75,8 +80,8 @@ pub enum MethodName {
 pub enum BracketsName {
     /// The nearest drawn point on the other side
     Drawn,
-    /// Points about two surfel radii away in the map of close pairs (Klein & Zachmann 2005, section
-    /// 4.3); beyond the map, the drawn points
+    /// The map of close pairs of a, which `preprocess --close-pairs` adds, as far as it reaches
+    /// (Klein & Zachmann 2005, section 4.3)
     Annulus,
 }
 
@@ -125,14 +130,38 @@ impl SearchArgs {
         self.method == MethodName::Interpolation
     }
 
-    /// Fails if the method needs a proximity graph and a scan has none.
-    pub(crate) fn check(&self, a: &Scan, b: &Scan) -> Result<(), CliError> {
-        let lacks = |scan: &Scan| scan.graph().is_none();
-        if self.wants_graphs() && (lacks(a) || lacks(b)) {
-            let which = if lacks(a) { "the first" } else { "the second" };
+    /// Returns `true` if the method looks up close pairs of a.
+    fn wants_close_pairs(&self) -> bool {
+        self.wants_graphs() && self.flat && self.brackets == BracketsName::Annulus
+    }
+
+    /// Returns the options of the graphs that the method needs.
+    pub(crate) fn graph_options(&self) -> GraphOptions {
+        GraphOptions::default().with_close_pairs(self.wants_close_pairs().then_some(Paths::Rebuilt))
+    }
+
+    /// Fails if a scan lacks the graph or the close pairs that the method needs. `paths` are those
+    /// of the scans.
+    pub(crate) fn check(&self, scans: [&Scan; 2], paths: [&Path; 2]) -> Result<(), CliError> {
+        if !self.wants_graphs() {
+            return Ok(());
+        }
+        for (scan, path) in scans.into_iter().zip(paths) {
+            if scan.graph().is_none() {
+                return Err(CliError::Usage(format!(
+                    "{}: expected a proximity graph in both scans for --method interpolation, got none in this one; \
+                     {}, or use --method traversal",
+                    path.display(),
+                    prepare_again(path, "--graph")
+                )));
+            }
+        }
+        let (a, path) = (scans[0], paths[0]);
+        if self.wants_close_pairs() && a.graph().is_none_or(|graph| graph.close_pairs().is_none()) {
             return Err(CliError::Usage(format!(
-                "--method interpolation: expected two scans with a proximity graph, got none in {which} scan; prepare it again \
-                 with `--graph`, or use --method traversal"
+                "{}: expected close pairs in the first scan for --brackets annulus, got none; {}, or use --brackets drawn",
+                path.display(),
+                prepare_again(path, "--close-pairs")
             )));
         }
         Ok(())

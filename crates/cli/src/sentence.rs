@@ -54,7 +54,10 @@ pub(crate) fn sentence(
         Verdict::Separated { gap, evidence } => {
             let found = if gap > 0.0 { "" } else { " found" };
             let within = margin.map_or(String::new(), |margin| format!(" within {margin}"));
-            let apart = distance.filter(|distance| distance.upper > 0.0).map(|distance| {
+            let apart = distance.map(|distance| {
+                if distance.upper <= 0.0 {
+                    return "; no clearance is known".to_owned();
+                }
                 let distance = Distance { lower: distance.lower.max(gap).min(distance.upper), ..*distance };
                 let is_near = thickened.is_none() && distance.upper < distance.band;
                 let near = if is_near {

@@ -11,6 +11,7 @@ mod reach_picture;
 mod refusal;
 mod report;
 mod route;
+mod searching;
 mod start;
 mod storey_view;
 mod track;

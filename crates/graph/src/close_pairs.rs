@@ -78,6 +78,17 @@ impl ClosePairs {
     /// pairs or more.
     #[must_use]
     pub fn build(network: Network<'_>, support_radii: &[f32], paths: Paths) -> Self {
+        Self::build_watched(network, support_radii, paths, &|_| ())
+    }
+
+    /// Like [`Self::build`]. Each thread passes the shares of the points that it has finished to
+    /// `told`; they add up to 1 before the lists are sorted.
+    pub(crate) fn build_watched(
+        network: Network<'_>,
+        support_radii: &[f32],
+        paths: Paths,
+        told: &(dyn Fn(f64) + Sync),
+    ) -> Self {
         let count = network.len();
         assert_eq!(count, support_radii.len(), "expected a support radius for each point");
         let length = count.div_ceil(STRETCHES).max(1);
@@ -88,10 +99,13 @@ impl ClosePairs {
             |spread, sources| {
                 let mut ends = Vec::with_capacity(sources.len());
                 let mut reached = Vec::new();
+                #[expect(clippy::cast_precision_loss, reason = "a share")]
+                let share = sources.len() as f64 / count as f64;
                 for source in sources {
                     spread.within(network, id32(source), support_radii[source], &mut reached);
                     ends.push(reached.len());
                 }
+                told(share);
                 (ends, reached)
             },
         );

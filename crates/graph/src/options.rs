@@ -45,14 +45,14 @@ pub struct GraphOptions {
     pub neighbours: u32,
     /// Pruning of long edges. Default: [`Prune::Quartiles`] with k = 1.
     pub prune: Prune,
-    /// The data stored for paths between close pairs; `None` for no map of close pairs. Default: a
-    /// map, with nothing stored for paths.
+    /// The data stored for paths between close pairs; `None`, the default, for no map of close
+    /// pairs. The geodesic kernel needs the map. It takes most of the time and memory.
     pub close_pairs: Option<Paths>,
 }
 
 impl Default for GraphOptions {
     fn default() -> Self {
-        Self { neighbours: 4, prune: Prune::Quartiles(1.0), close_pairs: Some(Paths::Rebuilt) }
+        Self { neighbours: 4, prune: Prune::Quartiles(1.0), close_pairs: None }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use bytemuck::{Pod, Zeroable};
 use nearmiss_lanes::parallel::both;
-use nearmiss_store::{Array, Check, File, Flaw, LoadError, WriteError, Writer};
+use nearmiss_store::{Array, Check, File, Flaw, LoadError, Progress, WriteError, Writer};
 use nearmiss_surface::SurfacePlan;
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +18,16 @@ use crate::{
 /// Paths over virtual edges may pass through a point if the sum of its distances from both ends is
 /// at most this multiple of the distance of the ends.
 const NARROW: f32 = 1.5;
+
+/// The progress of a build with close pairs, as shares of its running time: once the points are
+/// joined, the normals oriented, the points near each point found, and the map of them stored.
+const JOINED: f64 = 0.2;
+const ORIENTED: f64 = 0.35;
+const SEARCHED: f64 = 0.74;
+const MAPPED: f64 = 0.91;
+
+/// The progress of a build without close pairs once the points are joined.
+const JOINED_ALONE: f64 = 0.6;
 
 const CONFIDENCE: [u8; 4] = *b"CNFD";
 const PARTS: [u8; 4] = *b"PART";
@@ -107,12 +117,32 @@ impl SurfaceGraph {
         normals: &mut [[f32; 3]],
         options: &GraphOptions,
     ) -> Result<Self, GraphError> {
+        Self::build_watched(samples, sides, normals, options, &Progress::default())
+    }
+
+    /// Like [`Self::build`], and tells `progress` the share of the work that is done.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    ///
+    /// # Panics
+    /// As [`Self::build`].
+    pub fn build_watched(
+        samples: SurfaceSamples<'_>,
+        sides: Sides<'_>,
+        normals: &mut [[f32; 3]],
+        options: &GraphOptions,
+        progress: &Progress,
+    ) -> Result<Self, GraphError> {
+        let [joined, oriented] =
+            if options.close_pairs.is_some() { [JOINED, ORIENTED] } else { [JOINED_ALONE, 1.0] };
         let points = PointGraph::build(samples.positions, options)?;
-        let oriented = orient(points.edges(), samples.positions, samples.radii, sides, normals);
-        let parts: Vec<StoredPart> = oriented.parts.iter().map(StoredPart::of).collect();
+        progress.reach(joined);
+        let found = orient(points.edges(), samples.positions, samples.radii, sides, normals);
+        let parts: Vec<StoredPart> = found.parts.iter().map(StoredPart::of).collect();
         let graph = Self {
             points,
-            confidence: oriented.confidence.into(),
+            confidence: found.confidence.into(),
             parts: parts.into(),
             close_pairs: Vec::new(),
             levels: OnceLock::new(),
@@ -120,20 +150,26 @@ impl SurfaceGraph {
             areas: OnceLock::new(),
             bridged: OnceLock::new(),
         };
+        progress.reach(oriented);
         Ok(match options.close_pairs {
             None => graph,
-            Some(paths) => graph.with_close_pairs(samples, paths),
+            Some(paths) => graph.with_close_pairs(samples, paths, progress),
         })
     }
 
-    fn with_close_pairs(self, samples: SurfaceSamples<'_>, paths: Paths) -> Self {
+    fn with_close_pairs(self, samples: SurfaceSamples<'_>, paths: Paths, progress: &Progress) -> Self {
         let network = self.network(samples.positions);
-        let map =
-            |network, radii: &[f32]| ClosePairs::build(network, &support_radii(samples.plan, radii), paths);
+        let map = |network, radii: &[f32], told: &(dyn Fn(f64) + Sync)| {
+            ClosePairs::build_watched(network, &support_radii(samples.plan, radii), paths, told)
+        };
+        let of_points = |share: f64| progress.add((SEARCHED - ORIENTED) * share);
         // Building levels uses one core only.
-        let (of_points, levels) =
-            both(|| map(network, samples.radii), || self.levels(samples.positions, samples.radii));
-        let of_cells = levels.cells().iter().map(|cells| map(cells.network(), cells.radii()));
+        let (of_points, levels) = both(
+            || map(network, samples.radii, &of_points),
+            || self.levels(samples.positions, samples.radii),
+        );
+        progress.reach(MAPPED);
+        let of_cells = levels.cells().iter().map(|cells| map(cells.network(), cells.radii(), &|_| ()));
         let close_pairs = std::iter::once(of_points).chain(of_cells).collect();
         Self { close_pairs, ..self }
     }

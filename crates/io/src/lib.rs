@@ -40,7 +40,7 @@ pub use error::{At, Fault, Foreign, Item, Place, ReadError};
 pub use format::{Format, UnknownFormatName};
 pub use glance::{Glance, glance};
 pub use out::{OutError, OutputFormat, PointWriter, ScaleOffset, Survey, UnknownOutputFormat};
-pub use pieces::{Pieces, PointPieces, read_in_pieces};
+pub use pieces::{Pieces, PointPieces, read_in_pieces, read_watched};
 pub use points::Points;
 pub use read::{format_of, read, read_bytes, read_mesh, read_mesh_bytes};
 pub use sink::Model;

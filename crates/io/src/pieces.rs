@@ -15,9 +15,10 @@ use crate::format::Format;
 use crate::input::Input;
 use crate::out::ScaleOffset;
 use crate::points::Points;
-use crate::read::{Start, check_file, parse_as, stream};
+use crate::read::{Start, check_file, parse_as, stream, with_scanners};
 use crate::rows::{Blocks, Encoding, Layout};
 use crate::selection::Selection;
+use crate::sink::{Model, Sink};
 use crate::{las, npy, pcd, ply, xyz};
 
 /// A mesh, or points that can be read in pieces.
@@ -71,41 +72,99 @@ pub fn read_in_pieces(
     block: usize,
 ) -> Result<Pieces, ReadError> {
     let path = path.as_ref();
-    let failed = |cause| ReadError::Io { path: path.into(), cause };
-    check_file(path)?;
-    let mut file = File::open(path).map_err(failed)?;
-    let Start { mut head, mark, length, format } = Start::of(&mut file, format, path)?;
-    let block = block.max(1);
-    if format.is_streamed() {
-        return Ok(Pieces::Points(PointPieces {
-            path: path.into(),
-            source: Source::Stream { file, format, block, selection: Selection::default() },
-        }));
-    }
-    let layout = match format {
-        Format::Ply => ply::layout(&head[mark..]),
-        Format::Pcd => pcd::layout(&head[mark..]),
-        Format::Xyz => xyz::layout(&head[mark..]),
-        Format::Npy => npy::layout(&head[mark..]).ok(),
-        Format::Obj | Format::Las | Format::E57 | Format::Stl | Format::Off | Format::Gltf => None,
+    let rest = match Opened::new(path, format, block)? {
+        Opened::Points(points) => return Ok(Pieces::Points(points)),
+        Opened::Rest(rest) => rest,
     };
-    let points = |source| Pieces::Points(PointPieces { path: path.into(), source });
-    // A header that fills the whole head may continue after it.
-    if let Some(mut layout) = layout.filter(|layout| mark + layout.start < head.len()) {
-        layout.start += mark;
-        layout.check_length(length).map_err(|broken| broken.of(path))?;
-        return Ok(points(Source::Rows { file, layout, block }));
-    }
-    file.read_to_end(&mut head).map_err(failed)?;
-    let sink = parse_as(format, &head[mark..], path)?;
-    drop(head);
-    match sink.into_points() {
-        Ok(whole) => Ok(points(Source::Whole(whole))),
+    match rest.parse(path)?.into_points() {
+        Ok(whole) => Ok(Pieces::Points(PointPieces { path: path.into(), source: Source::Whole(whole) })),
         Err(sink) => {
             let vertices = sink.points().clone();
             let no_faces = || ReadError::NoFaces { path: path.into() };
             sink.into_mesh(path)?.map(|mesh| Pieces::Mesh { vertices, mesh }).ok_or_else(no_faces)
         }
+    }
+}
+
+/// Like [`read`](crate::read()), and passes the numbers of points that were read to `told`, block
+/// by block. Files that cannot be read in pieces are not reported.
+///
+/// # Errors
+/// Fails like [`read`](crate::read()).
+pub fn read_watched(
+    path: impl AsRef<Path>,
+    format: Option<Format>,
+    told: &mut dyn FnMut(usize),
+) -> Result<Model, ReadError> {
+    const BLOCK: usize = 1 << 20;
+    let path = path.as_ref();
+    let pieces = match Opened::new(path, format, BLOCK)? {
+        Opened::Points(pieces) => pieces,
+        Opened::Rest(rest) => return rest.parse(path)?.into_model(path),
+    };
+    let mut sink = Sink::default();
+    pieces.each(|points| {
+        sink.append(points);
+        told(points.len());
+    })?;
+    match &pieces.source {
+        Source::Stream { file, format, .. } => with_scanners(sink, *format, Input::File(file), path)?,
+        Source::Rows { .. } | Source::Whole(_) => sink,
+    }
+    .into_model(path)
+}
+
+/// A file whose header was read.
+enum Opened {
+    /// A file that can be read in pieces.
+    Points(PointPieces),
+    /// Any other file.
+    Rest(Rest),
+}
+
+/// A file that is read as a whole.
+struct Rest {
+    file: File,
+    /// The bytes that were read so far.
+    head: Vec<u8>,
+    /// Length of the byte order mark in bytes.
+    mark: usize,
+    format: Format,
+}
+
+impl Rest {
+    fn parse(mut self, path: &Path) -> Result<Sink, ReadError> {
+        let failed = |cause| ReadError::Io { path: path.into(), cause };
+        self.file.read_to_end(&mut self.head).map_err(failed)?;
+        parse_as(self.format, &self.head[self.mark..], path)
+    }
+}
+
+impl Opened {
+    fn new(path: &Path, format: Option<Format>, block: usize) -> Result<Self, ReadError> {
+        let failed = |cause| ReadError::Io { path: path.into(), cause };
+        check_file(path)?;
+        let mut file = File::open(path).map_err(failed)?;
+        let Start { head, mark, length, format } = Start::of(&mut file, format, path)?;
+        let block = block.max(1);
+        let points = |source| Self::Points(PointPieces { path: path.into(), source });
+        if format.is_streamed() {
+            return Ok(points(Source::Stream { file, format, block, selection: Selection::default() }));
+        }
+        let layout = match format {
+            Format::Ply => ply::layout(&head[mark..]),
+            Format::Pcd => pcd::layout(&head[mark..]),
+            Format::Xyz => xyz::layout(&head[mark..]),
+            Format::Npy => npy::layout(&head[mark..]).ok(),
+            Format::Obj | Format::Las | Format::E57 | Format::Stl | Format::Off | Format::Gltf => None,
+        };
+        // A header that fills the whole head may continue behind it.
+        if let Some(mut layout) = layout.filter(|layout| mark + layout.start < head.len()) {
+            layout.start += mark;
+            layout.check_length(length).map_err(|broken| broken.of(path))?;
+            return Ok(points(Source::Rows { file, layout, block }));
+        }
+        Ok(Self::Rest(Rest { file, head, mark, format }))
     }
 }
 

@@ -168,11 +168,23 @@ fn collect(format: Format, input: Input<'_>, path: &Path) -> Result<Sink, ReadEr
         sink.append(points);
         ControlFlow::Continue(())
     })?;
+    with_scanners(sink, format, input, path)
+}
+
+/// Adds the positions of the scanners, which only E57 has.
+pub(crate) fn with_scanners(
+    sink: Sink,
+    format: Format,
+    input: Input<'_>,
+    path: &Path,
+) -> Result<Sink, ReadError> {
     #[cfg(feature = "e57")]
     if format == Format::E57 {
         let scanners = e57::scanners(input).map_err(|stop| stop.of(path))?;
-        sink = sink.with_scanners(scanners);
+        return Ok(sink.with_scanners(scanners));
     }
+    #[cfg(not(feature = "e57"))]
+    let _none = (format, input, path);
     Ok(sink)
 }
 

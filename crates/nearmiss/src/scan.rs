@@ -12,7 +12,7 @@ use nearmiss_graph::{
 };
 use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy, ScanPoints};
 use nearmiss_query::{Placed, Prepared, ShapeIndex};
-use nearmiss_store::{Bytes, Check, File, Flaw, Workspace, Writer};
+use nearmiss_store::{Bytes, Check, File, Flaw, Progress, Workspace, Writer};
 use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +28,12 @@ const VERSION: u32 = 10;
 /// Whenever a section or a metadata field is added or changes, raise this together with [`VERSION`]
 /// and record a golden file.
 const OLDEST: u32 = 10;
+
+/// The progress of a fit for the geodesic kernel once all points are fitted.
+const FITTED: f64 = 0.7;
+
+/// The points that are fitted between two reports of the progress.
+const TOLD: u32 = 1024;
 
 /// Metadata of a scan's file: everything except the arrays.
 #[derive(Debug, Serialize, Deserialize)]
@@ -122,8 +128,8 @@ impl Scan {
     ///
     /// The side of the normals is that of the cloud's own normals if it has any. Otherwise normals
     /// point towards `scanner`, a position in the frame of the cloud, or towards the cloud's own
-    /// [scanners](PointCloud::scanners). Without a scanner they point outwards. Takes about three
-    /// times as long as [`Scan::build`], and half of that without the map of close pairs.
+    /// [scanners](PointCloud::scanners). Without a scanner they point outwards. Takes about as long
+    /// as [`Scan::build`], and about three times as long with the map of close pairs.
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, GraphOptions, PointCloud, Scan};
@@ -148,6 +154,21 @@ impl Scan {
         options: &GraphOptions,
         scanner: Option<[f64; 3]>,
     ) -> Result<Self, GraphError> {
+        self.with_graph_watched(cloud, options, scanner, &Progress::default())
+    }
+
+    /// Like [`Self::with_graph`], and tells `progress` the share of the work that is done. The work
+    /// for the geodesic kernel is not part of it.
+    ///
+    /// # Errors
+    /// As [`Self::with_graph`].
+    pub fn with_graph_watched(
+        self,
+        cloud: &PointCloud,
+        options: &GraphOptions,
+        scanner: Option<[f64; 3]>,
+        progress: &Progress,
+    ) -> Result<Self, GraphError> {
         let metric = self.metric();
         if let Some(place) = scanner.filter(|place| place.iter().any(|c| !c.is_finite())) {
             return Err(GraphError::Scanner(place));
@@ -159,7 +180,7 @@ impl Scan {
         let scanner = one.or(each.as_deref().map(Viewpoint::Each));
         let mut normals = hierarchy.normals().to_vec();
         let sides = Sides { normals: own.as_deref(), scanner };
-        let graph = SurfaceGraph::build(samples(&hierarchy), sides, &mut normals, options)?;
+        let graph = SurfaceGraph::build_watched(samples(&hierarchy), sides, &mut normals, options, progress)?;
         hierarchy.turn_normals(&normals);
         let scan = Self::of(hierarchy, Some(Arc::new(graph)));
         match metric {
@@ -175,12 +196,13 @@ impl Scan {
     /// contacts can be certified then, never separations. [`Scan::save`] stores the metric.
     ///
     /// ```
-    /// # use nearmiss::{BuildOptions, GraphOptions, Metric, PointCloud, Scan};
+    /// # use nearmiss::{BuildOptions, GraphOptions, Metric, Paths, PointCloud, Scan};
     /// # let points: Vec<[f64; 3]> =
     /// #     (0..400_u32).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
     /// let cloud = PointCloud::from_positions(&points)?;
     /// let scan = Scan::build(&cloud, &BuildOptions::default())?;
-    /// let scan = scan.with_graph(&cloud, &GraphOptions::default(), None)?.with_geodesic_kernel()?;
+    /// let options = GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt));
+    /// let scan = scan.with_graph(&cloud, &options, None)?.with_geodesic_kernel()?;
     /// assert_eq!(scan.metric(), Metric::Geodesic);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -188,6 +210,15 @@ impl Scan {
     /// # Errors
     /// [`GraphError::NoClosePairs`] if the scan has no graph, or one without a map of close pairs.
     pub fn with_geodesic_kernel(self) -> Result<Self, GraphError> {
+        self.with_geodesic_kernel_watched(&Progress::default())
+    }
+
+    /// Like [`Self::with_geodesic_kernel`], and tells `progress` the share of the work that is
+    /// done.
+    ///
+    /// # Errors
+    /// As [`Self::with_geodesic_kernel`].
+    pub fn with_geodesic_kernel_watched(self, progress: &Progress) -> Result<Self, GraphError> {
         let Self { hierarchy, graph, density, .. } = self;
         let graph = graph.ok_or(GraphError::NoClosePairs)?;
         let mut hierarchy = Arc::unwrap_or_clone(hierarchy);
@@ -195,7 +226,12 @@ impl Scan {
         let plan = *hierarchy.plan();
         let samples = SurfaceSamples { plan: &plan, positions: &positions, radii: &radii };
         let kernel = graph.kernel(samples).ok_or(GraphError::NoClosePairs)?;
+        #[expect(clippy::cast_precision_loss, reason = "a share")]
+        let step = FITTED * f64::from(TOLD) / positions.len() as f64;
         hierarchy.use_metric(Metric::Geodesic, |i, scratch: &mut KernelScratch, supporting| {
+            if i.is_multiple_of(TOLD) {
+                progress.add(step);
+            }
             let (at, near) = kernel.evaluate_at(i, scratch);
             supporting.extend(near.iter().map(|close| close.point));
             at

@@ -190,6 +190,16 @@ pub struct Clashes {
     pub answers: (Answer, Option<Answer>),
 }
 
+/// The progress of a list with a clearance, as shares of its running time: after the search for
+/// contact, the search within the clearance, the comparison of both, and the groups.
+const TOUCHING: f64 = 0.05;
+const NEAR: f64 = 0.4;
+const MERGED: f64 = 0.5;
+const GROUPED: f64 = 0.98;
+
+/// The progress of a list without a clearance after the search for contact.
+const TOUCHING_ALONE: f64 = 0.9;
+
 impl Pair<'_> {
     /// Lists every place where the scans meet or, with a clearance, come nearer than it.
     ///
@@ -198,13 +208,29 @@ impl Pair<'_> {
     /// may spend the whole budget. Allocates. Deterministic unless the budget has a deadline.
     #[must_use]
     pub fn clashes(&self, plan: &ClashPlan, scratch: &mut Scratch) -> Clashes {
+        self.clashes_watched(plan, scratch, &mut |_| ())
+    }
+
+    /// Like [`Self::clashes`], and passes the share of the work that is done to `told` after each
+    /// step: the searches, the groups, and the distances.
+    #[must_use]
+    pub fn clashes_watched(
+        &self,
+        plan: &ClashPlan,
+        scratch: &mut Scratch,
+        told: &mut dyn FnMut(f64),
+    ) -> Clashes {
         let views = self.scans().each_ref();
         let link = plan.link(views);
         let mut hard = Contacts::default();
         let answer = self.contacts(&mut hard).collide(&plan.touching, scratch);
+        told(if plan.near.is_some() { TOUCHING } else { TOUCHING_ALONE });
         let mut near = Contacts { contacts: Vec::new(), complete: true };
         let near_answer = plan.near.as_ref().map(|plan| self.contacts(&mut near).collide(plan, scratch));
 
+        if plan.near.is_some() {
+            told(NEAR);
+        }
         let count = hard.contacts.len();
         let groups = ContactGroup::all(&hard.contacts, link);
         let mut contacts = hard.contacts;
@@ -218,7 +244,12 @@ impl Pair<'_> {
                     points.push(near);
                 }
             }
-            let NearContacts { surroundings, misses } = NearContacts::new(&contacts, count, &groups, link);
+            told(MERGED);
+            let NearContacts { surroundings, misses } =
+                NearContacts::new(&contacts, count, &groups, link, &mut |share| {
+                    told(MERGED + (GROUPED - MERGED) * share);
+                });
+            told(GROUPED);
             let nearness = nearness(views, plan, scratch.level(), (&contacts, &points), &misses);
             clashes
                 .extend(groups.into_iter().zip(surroundings).map(|(group, near)| Clash::hard(group, near)));

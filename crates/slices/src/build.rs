@@ -9,7 +9,7 @@ use std::convert::Infallible;
 use nearmiss_geometry::{PointCloud, TriangleMesh};
 use nearmiss_lanes::parallel::{change_each, map_each};
 use nearmiss_mesh::{Lattice, lattice_samples};
-use nearmiss_store::Workspace;
+use nearmiss_store::{Progress, Workspace};
 
 use crate::error::SliceError;
 use crate::layer::{BLOCKS, Layer, PART};
@@ -43,6 +43,8 @@ pub struct SliceBuilder {
     points: u64,
     left_out: u64,
     is_filled: bool,
+    /// The progress of the present step: adding a mesh, or making the slices.
+    progress: Progress,
 }
 
 impl SliceBuilder {
@@ -67,7 +69,8 @@ impl SliceBuilder {
         let area = plan.grid().area();
         let layers =
             (0..plan.grid().counts[2]).map(|s| Layer::new(&stage, s, area)).collect::<Result<_, _>>()?;
-        Ok(Self { plan: *plan, layers, points, left_out, is_filled: filled.is_some() })
+        let progress = work.progress().clone();
+        Ok(Self { plan: *plan, layers, points, left_out, is_filled: filled.is_some(), progress })
     }
 
     /// Returns `true` if all points are in, as recorded by [`Self::keep`] in this process or an
@@ -106,6 +109,8 @@ impl SliceBuilder {
     /// Adds a mesh by sampling it: every voxel that its surface passes gets the lowest and the
     /// highest point of the surface in it, up to rounding. Returns the number of samples.
     ///
+    /// Tells the progress of the workspace the share of the surface that is added.
+    ///
     /// Only the part of a triangle within the bounds of the plan is added. Triangles with a corner
     /// that is not finite are left out. Each triangle that is left out in part or whole is counted.
     pub fn add_mesh(&mut self, mesh: &TriangleMesh) -> u64 {
@@ -114,8 +119,17 @@ impl SliceBuilder {
         let before = self.points;
         let mut batch = Vec::with_capacity(BATCH);
         let corners = mesh.vertices();
+        let triangle_of = |triangle: &[u32; 3]| triangle.map(|v| up.to_map(corners[v as usize]));
+        let whole: f64 = mesh.triangles().iter().map(|triangle| area(triangle_of(triangle))).sum();
+        let (mut added, mut told) = (0.0, 0.0);
+        self.progress.reach(0.0);
         for triangle in mesh.triangles() {
-            let triangle = triangle.map(|v| up.to_map(corners[v as usize]));
+            let triangle = triangle_of(triangle);
+            added += area(triangle);
+            if added >= told + TOLD * whole {
+                self.progress.reach(added / whole);
+                told = added;
+            }
             let is_whole = lattice_samples(triangle, &lattice, |p| {
                 batch.push(p);
                 if batch.len() == BATCH {
@@ -186,6 +200,7 @@ impl SliceBuilder {
     }
 
     /// Passes the slices of the map to `take`, lowest first, some at a time, until the first error.
+    /// Tells the progress of the workspace the share of the slices that are taken.
     pub(crate) fn each<E>(
         self,
         index: Index,
@@ -193,13 +208,25 @@ impl SliceBuilder {
         take: impl FnMut(Vec<Slice>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut layers = self.layers;
-        finish::each(&index.grid, &mut layers, finish::most_levels(index.about.share), together, take)
+        let steps = (finish::most_levels(index.about.share), together);
+        finish::each(&index.grid, &mut layers, steps, &self.progress, take)
     }
 
     /// Returns the number of slices that may be made at a time.
     pub(crate) fn together(&self) -> usize {
         self.plan.together().min(WAVE)
     }
+}
+
+/// The share of a mesh's surface between two reports of the progress.
+const TOLD: f64 = 1e-3;
+
+/// Returns the area of a triangle; 0 if a corner is not finite.
+fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
+    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+    let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let area = 0.5 * cross.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if area.is_finite() { area } else { 0.0 }
 }
 
 /// The points of a block, sorted by the part of the map that contains them.

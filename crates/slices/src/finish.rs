@@ -12,6 +12,7 @@
 //! point.
 
 use nearmiss_lanes::parallel::map_each;
+use nearmiss_store::Progress;
 
 use crate::Grid;
 use crate::grid::LEVELS;
@@ -96,13 +97,14 @@ pub(crate) fn noise(grid: &Grid, layers: &[Layer]) -> f64 {
     f64::from(levels) / f64::from(LEVELS) * grid.slice_height
 }
 
-/// Passes the slices to `take`, lowest first, `together` at a time, until the first error. Frees
-/// the cells on the way.
+/// Passes the slices to `take`, lowest first, `together` at a time, until the first error. A floor
+/// spans at most `most` levels. Frees the cells on the way, and tells `progress` the share of the
+/// slices that are taken.
 pub(crate) fn each<E>(
     grid: &Grid,
     layers: &mut [Layer],
-    most: i32,
-    together: usize,
+    (most, together): (i32, usize),
+    progress: &Progress,
     mut take: impl FnMut(Vec<Slice>) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut first = 0;
@@ -112,6 +114,8 @@ pub(crate) fn each<E>(
         // The slice above still needs the last one.
         layers[first.saturating_sub(1)..end - 1].fill_with(Layer::empty);
         first = end;
+        #[expect(clippy::cast_precision_loss, reason = "a share")]
+        progress.reach(first as f64 / layers.len() as f64);
     }
     Ok(())
 }

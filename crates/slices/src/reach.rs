@@ -49,10 +49,25 @@ impl Reach {
     /// # Errors
     /// If there are more than 2^26 places, or a slice is not loaded.
     pub fn new(map: &SliceMap, start: &Walker, falls: bool) -> Result<Self, WalkError> {
+        Self::new_watched(map, start, falls, &mut |_| ())
+    }
+
+    /// Like [`Reach::new`], and passes the number of explored places to `told`, again and
+    /// again. Places of a cell within a climb of each other count once. There are at most about
+    /// [`Avatar::estimated_places`].
+    ///
+    /// # Errors
+    /// As for [`Reach::new`].
+    pub fn new_watched(
+        map: &SliceMap,
+        start: &Walker,
+        falls: bool,
+        told: &mut dyn FnMut(usize),
+    ) -> Result<Self, WalkError> {
         let mut steps = Steps::new(map, *start.avatar(), falls)?;
         let mut edges = Vec::new();
         steps.enter(start, &mut edges)?;
-        steps.flood(edges)?;
+        steps.flood(edges, told)?;
         Ok(Self::of(map.grid(), &steps))
     }
 
@@ -126,7 +141,45 @@ impl Reach {
     }
 }
 
+/// The golden ratio less one. Its multiples, modulo one, cover the unit interval evenly.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// The number of cells at which [`Avatar::estimated_places`] looks.
+const LOOKS: u64 = 1024;
+
 impl Avatar {
+    /// Estimates the number of places of the lattice of [`Reach`] at which the avatar can stand, from
+    /// about a thousand cells. To tell the progress of a search.
+    ///
+    /// # Errors
+    /// If there are more than 2^26 places, or a slice is not loaded.
+    pub fn estimated_places(&self, map: &SliceMap) -> Result<f64, WalkError> {
+        let lattice = Steps::new(map, *self, false)?.lattice;
+        let [columns, rows] = lattice.counts;
+        let cells = columns.saturating_mul(rows);
+        // Neighbouring cells have much in common, so the cells that are looked at are far apart:
+        // they step by the golden ratio.
+        let looks = cells.min(LOOKS);
+        let (mut heights, mut found) = (Vec::new(), 0);
+        for look in 0..looks {
+            #[expect(
+                clippy::cast_precision_loss,
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a cell of the lattice, below 2^53"
+            )]
+            let cell = ((look as f64 * GOLDEN).fract() * cells as f64) as u64;
+            let cell = [cell % columns, cell / columns].map(|k| u32::try_from(k).unwrap_or(u32::MAX));
+            self.standing_heights(map, lattice.place(cell), &mut heights)?;
+            found += heights.len();
+        }
+        #[expect(clippy::cast_precision_loss, reason = "an estimate")]
+        let share = found as f64 / looks.max(1) as f64;
+        #[expect(clippy::cast_precision_loss, reason = "below 2^53")]
+        let cells = cells as f64;
+        Ok(share * cells)
+    }
+
     /// Finds a good place to start: the place nearest to the middle of the largest connected part
     /// of the lowest storey. Returns `None` if the avatar can stand nowhere. The distance of the
     /// result is 0.
@@ -136,6 +189,20 @@ impl Avatar {
     /// # Errors
     /// If there are more than 2^26 places, or a slice is not loaded.
     pub fn roomy_start(&self, map: &SliceMap, storeys: &[Storey]) -> Result<Option<Standing>, WalkError> {
+        self.roomy_start_watched(map, storeys, &mut |_| ())
+    }
+
+    /// Like [`Avatar::roomy_start`], and passes the number of explored places to `told`, as
+    /// [`Reach::new_watched`] does.
+    ///
+    /// # Errors
+    /// As for [`Avatar::roomy_start`].
+    pub fn roomy_start_watched(
+        &self,
+        map: &SliceMap,
+        storeys: &[Storey],
+        told: &mut dyn FnMut(usize),
+    ) -> Result<Option<Standing>, WalkError> {
         let mut heights = Vec::new();
         let range = storeys.first().map_or([f64::NEG_INFINITY, f64::INFINITY], |storey| storey.heights);
         let is_lowest = |height: f64| range[0] <= height && height < range[1];
@@ -155,7 +222,7 @@ impl Avatar {
                     let (node, _) = steps.node([column, row], &walker)?;
                     let mut edges = Vec::new();
                     steps.leave(node, &mut edges)?;
-                    steps.flood(edges)?;
+                    steps.flood(edges, told)?;
                     parts.push(first..steps.nodes().len());
                 }
             }

@@ -89,10 +89,25 @@ impl Route {
         [from, to]: [[f64; 3]; 2],
         falls: bool,
     ) -> Result<FoundRoute, RouteError> {
+        Self::find_watched(map, avatar, [from, to], falls, &mut |_| ())
+    }
+
+    /// Like [`Route::find`], and passes the number of places found so far to `told`, again and
+    /// again. There are at most about [`Avatar::estimated_places`].
+    ///
+    /// # Errors
+    /// As for [`Route::find`].
+    pub fn find_watched(
+        map: &SliceMap,
+        avatar: &Avatar,
+        [from, to]: [[f64; 3]; 2],
+        falls: bool,
+        told: &mut dyn FnMut(usize),
+    ) -> Result<FoundRoute, RouteError> {
         let start = avatar.placed(map, from).map_err(RouteError::Start)?;
         let goal = avatar.placed(map, to).map_err(RouteError::Goal)?;
         let mut search = Search::new(map, &start, goal, falls)?;
-        search.run()?;
+        search.run(told)?;
         let grid = map.grid();
         let Some(end) = search.end else {
             let (nearest, away) = search.nearest();
@@ -183,8 +198,9 @@ impl<'a> Search<'a> {
         Ok(Self { steps, start: *start, goal, known, open, end: None, edges, doorsteps })
     }
 
-    /// Explores the graph until the goal is the nearest open node, or no node is open.
-    fn run(&mut self) -> Result<(), WalkError> {
+    /// Explores the graph until the goal is the nearest open node, or no node is open. Passes the
+    /// number of known places to `told`, again and again.
+    fn run(&mut self, told: &mut dyn FnMut(usize)) -> Result<(), WalkError> {
         let mut edges = std::mem::take(&mut self.edges);
         let start = self.start;
         self.steps.enter(&start, &mut edges)?;
@@ -208,6 +224,7 @@ impl<'a> Search<'a> {
             }
             self.steps.leave(node, &mut edges)?;
             self.take_in(&edges, length, node);
+            told(self.steps.places());
         }
         Ok(())
     }

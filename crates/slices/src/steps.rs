@@ -58,6 +58,8 @@ pub(crate) struct Steps<'a> {
     pub(crate) lattice: StepGrid,
     falls: bool,
     nodes: Vec<Node>,
+    /// The number of nodes that are more than a climb away from all earlier nodes of their cell.
+    places: usize,
     /// The first node of each cell, tile by tile; tiles without nodes take no memory.
     tiles: Vec<Option<Box<[u32]>>>,
     tile_columns: usize,
@@ -81,12 +83,26 @@ impl<'a> Steps<'a> {
             return Err(WalkError::TooMuchWork { places, pixels });
         }
         let tile_columns = usize::try_from(columns).unwrap_or(usize::MAX);
-        Ok(Self { map, avatar, lattice, falls, nodes: Vec::new(), tiles: vec![None; tiles], tile_columns })
+        Ok(Self {
+            map,
+            avatar,
+            lattice,
+            falls,
+            nodes: Vec::new(),
+            places: 0,
+            tiles: vec![None; tiles],
+            tile_columns,
+        })
     }
 
     /// Returns all known nodes, in the order in which they were found.
     pub(crate) fn nodes(&self) -> &[Node] {
         &self.nodes
+    }
+
+    /// Returns the number of known places. Heights within a climb of each other are one place.
+    pub(crate) fn places(&self) -> usize {
+        self.places
     }
 
     /// Returns the walker that is in the state of a node.
@@ -121,7 +137,9 @@ impl<'a> Steps<'a> {
         let tile =
             self.tiles[tile].get_or_insert_with(|| vec![NONE; (TILE * TILE) as usize].into_boxed_slice());
         let mut node = tile[place];
+        let (climb, mut is_place) = (self.avatar.options().climb, true);
         while let Some(found) = self.nodes.get(node as usize) {
+            is_place &= (found.height - height).abs() > climb;
             if found.height.to_bits() == height.to_bits() && found.footing.to_bits() == footing.to_bits() {
                 return Ok((node, false));
             }
@@ -133,6 +151,7 @@ impl<'a> Steps<'a> {
         let index = u32::try_from(self.nodes.len()).unwrap_or(NONE);
         self.nodes.push(Node { cell, height, footing, next: tile[place] });
         tile[place] = index;
+        self.places += usize::from(is_place);
         Ok((index, true))
     }
 
@@ -173,12 +192,19 @@ impl<'a> Steps<'a> {
         Ok(())
     }
 
-    /// Explores everything that can be reached from the nodes of `edges`.
-    pub(crate) fn flood(&mut self, mut edges: Vec<Edge>) -> Result<(), WalkError> {
+    /// Explores everything that can be reached from the nodes of `edges`. Passes the number of
+    /// explored places to `told`, again and again.
+    pub(crate) fn flood(
+        &mut self,
+        mut edges: Vec<Edge>,
+        told: &mut dyn FnMut(usize),
+    ) -> Result<(), WalkError> {
         let mut open: Vec<u32> = edges.iter().filter(|edge| edge.is_new).map(|edge| edge.node).collect();
         while let Some(node) = open.pop() {
             self.leave(node, &mut edges)?;
             open.extend(edges.iter().filter(|edge| edge.is_new).map(|edge| edge.node));
+            let explored = self.nodes.len() - open.len();
+            told(self.places * explored / self.nodes.len().max(1));
         }
         Ok(())
     }

@@ -64,9 +64,19 @@ impl Progress {
 
     /// Sets the finished share, from 0 to 1.
     pub fn reach(&self, share: f64) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a million")]
-        self.done.store((share.clamp(0.0, 1.0) * 1e6) as u64, Ordering::Relaxed);
+        self.done.store(millionths(share), Ordering::Relaxed);
     }
+
+    /// Adds to the finished share. Threads may call it at the same time.
+    pub fn add(&self, share: f64) {
+        self.done.fetch_add(millionths(share), Ordering::Relaxed);
+    }
+}
+
+/// Returns a share, from 0 to 1, in millionths.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a million")]
+fn millionths(share: f64) -> u64 {
+    (share.clamp(0.0, 1.0) * 1e6) as u64
 }
 
 impl Workspace {

@@ -3,7 +3,7 @@
 //! An object is a file of points, with or without a mesh, or a name that `Object::read` knows.
 
 use nearmiss::{
-    BuildOptions, CollideOptions, Detail, Evidence, GraphOptions, Metric, Order, PointKind, Scan,
+    BuildOptions, CollideOptions, Detail, Evidence, GraphOptions, Metric, Order, Paths, PointKind, Scan,
 };
 use nearmiss_benches::asked;
 use nearmiss_benches::clock::timed;
@@ -136,7 +136,11 @@ const TURNED: f32 = 5.0;
 
 /// Prepares the scan for the geodesic kernel; prints the time and the results.
 fn for_geodesic(object: &Object, scan: &Scan) -> Result<Scan, Failure> {
-    let scan = scan.clone().with_graph(&object.cloud, &GraphOptions::default(), None)?;
+    let scan = scan.clone().with_graph(
+        &object.cloud,
+        &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)),
+        None,
+    )?;
     let (along, time) = timed(|| scan.clone().with_geodesic_kernel());
     let along = along?;
     let turned = |(p, q): &(&[f32; 3], &[f32; 3])| {

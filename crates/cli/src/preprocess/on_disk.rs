@@ -9,9 +9,9 @@ use nearmiss::{Aabb, GatheredPoints, Intake, IntakeError, PointGatherer, Scan, W
 use super::args::{PreprocessArgs, options};
 use super::outcome::{Seconds, save, tell};
 use crate::console::{Console, now};
-use crate::digits::grouped;
 use crate::error::CliError;
 use crate::filters::{ClassList, Filtered};
+use crate::progress::short_name;
 use crate::report::ScanReport;
 use crate::{input, output};
 
@@ -54,10 +54,8 @@ pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Cons
 
     let start = now();
     let points = gathered.points();
-    let bar = console.share(format_args!("preparing {} points", grouped(points.len() as u64)), {
-        let (progress, points) = (work.progress().clone(), points.len());
-        move || (progress.share(), points)
-    });
+    let name = short_name(&args.input);
+    let bar = console.watch_points(format_args!("preparing {name}"), work.progress(), points.len());
     let scan = Scan::build_in(&points, &options(args), &work)
         .map_err(|cause| CliError::Build { path: args.input.clone(), cause })?;
     drop(bar);

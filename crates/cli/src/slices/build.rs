@@ -13,6 +13,8 @@ use crate::error::CliError;
 use crate::memory::MemoryArgs;
 use crate::parse::parse_length;
 use crate::preprocess::{FormatChoice, parse_format, parse_threads};
+use crate::progress::short_name;
+use crate::threads::pool;
 use crate::{input, output};
 
 /// Options of `slices build`.
@@ -117,9 +119,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     let (plan, work) = place(args, &options(args, matches!(source, Pieces::Mesh { .. })), &bounds, console)?;
     let [width, height, slices] = plan.grid().counts;
     let what = format!("filling {slices} slices of {width} × {height} pixels");
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.or(Err(CliError::Threads(args.threads)))?;
-    pool.install(|| {
+    pool(args.threads)?.install(|| {
         let mut builder = SliceBuilder::new_in(&plan, &work).map_err(unsuitable)?;
         if builder.is_filled() {
             console.note("resuming an interrupted run");
@@ -133,15 +133,17 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
                     })?;
                 }
                 Pieces::Mesh { mesh, .. } => {
-                    let _bar = console.spinner(what);
+                    let count = mesh.triangles().len();
+                    let _bar = console.watch_share(what, "triangles", work.progress(), count);
                     builder.add_mesh(mesh);
                 }
             }
             builder.keep(&work).map_err(unsuitable)?;
         }
-        let _bar = console.spinner(format_args!("writing {}", args.output.display()));
-        if work.is_in_memory() { target.save(&builder.finish()) } else { target.build(builder) }
-            .map_err(CliError::from)
+        work.progress().reach(0.0);
+        let what = format!("making and writing {}", short_name(&args.output));
+        let _bar = console.watch_share(what, "slices", work.progress(), slices as usize);
+        target.build(builder).map_err(CliError::from)
     })?;
     work.remove();
     let folder = open(&args.output)?;
@@ -195,7 +197,7 @@ fn bounds(path: &Path, points: &PointPieces, bar: &Bar) -> Result<(Aabb, u64), C
     Ok((bounds, given as u64))
 }
 
-fn options(args: &BuildArgs, is_mesh: bool) -> SliceOptions {
+pub(crate) fn options(args: &BuildArgs, is_mesh: bool) -> SliceOptions {
     let pixel = match (args.pixel.pixel, args.pixel.resolution) {
         (Some(side), _) => Pixel::Side(side),
         (None, count) => Pixel::Count(count.unwrap_or(700)),

@@ -11,10 +11,12 @@ use serde::Serialize;
 use super::avatar_args::{AvatarArgs, Spot, check_outputs, load, parse_spot};
 use super::reach_picture::{Marks, paint};
 use super::refusal::{misplaced, refused};
+use super::searching::watch;
 use crate::console::{Console, Results, now};
 use crate::digits::{count, place, rounded, short};
 use crate::error::CliError;
 use crate::output;
+use crate::progress::Counter;
 
 /// Options of `slices reach`.
 #[derive(Debug, Clone, Args)]
@@ -85,11 +87,13 @@ pub(super) fn run(args: &ReachArgs) -> Result<(), CliError> {
     let (folder, map) = load(&args.folder, args.quiet)?;
     let grid = folder.grid();
     let avatar = args.avatar.avatar(grid)?;
-    let bar = Console::new(args.quiet).spinner("looking for places within reach");
+    let count = Counter::default();
+    let bar = watch(Console::new(args.quiet), "looking for places within reach", (&map, &avatar), &count);
     let start =
         avatar.placed(&map, args.start.0).map_err(|cause| misplaced(&args.folder, "start", grid, &cause))?;
     let failed = |cause| refused(&args.folder, &cause);
-    let reach = Reach::new(&map, &start, args.falls).map_err(failed)?;
+    let reach = Reach::new_watched(&map, &start, args.falls, &mut |places| count.set(places as u64));
+    let reach = reach.map_err(failed)?;
     let storeys = map.storeys(&avatar).map_err(|cause| failed(cause.into()))?;
     drop(bar);
     let covered = reach.by_storey(&storeys);

@@ -9,12 +9,14 @@ use serde::Serialize;
 use super::avatar_args::{AvatarArgs, Spot, check_outputs, load, parse_spot};
 use super::reach_picture::{Marks, paint};
 use super::refusal::{no_route, refused};
+use super::searching::watch;
 use super::track::Track;
 use super::walk_picture;
 use crate::console::{Console, Results, now};
 use crate::digits::{count, place, short};
 use crate::error::CliError;
 use crate::output;
+use crate::progress::Counter;
 
 /// Options of `slices route`.
 #[derive(Debug, Clone, Args)]
@@ -76,8 +78,10 @@ pub(super) fn run(args: &RouteArgs) -> Result<(), CliError> {
     let (folder, map) = load(&args.folder, args.quiet)?;
     let grid = folder.grid();
     let avatar = args.avatar.avatar(grid)?;
-    let bar = Console::new(args.quiet).spinner("looking for a route");
-    let found = Route::find(&map, &avatar, [args.from.0, args.to.0], args.falls);
+    let count = Counter::default();
+    let bar = watch(Console::new(args.quiet), "looking for a route", (&map, &avatar), &count);
+    let told = &mut |places| count.set(places as u64);
+    let found = Route::find_watched(&map, &avatar, [args.from.0, args.to.0], args.falls, told);
     drop(bar);
     let seconds = begin.elapsed().as_secs_f64();
     match found {

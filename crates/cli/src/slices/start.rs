@@ -8,9 +8,11 @@ use serde::Serialize;
 
 use super::avatar_args::{AvatarArgs, Spot, load, parse_spot};
 use super::refusal::{refused, told_place};
+use super::searching::watch;
 use crate::console::{Console, Results};
 use crate::digits::short;
 use crate::error::CliError;
+use crate::progress::Counter;
 
 /// Options of `slices start`.
 #[derive(Debug, Clone, Args)]
@@ -48,11 +50,12 @@ pub(super) fn run(args: &StartArgs) -> Result<(), CliError> {
     let grid = folder.grid();
     let avatar = args.avatar.avatar(grid)?;
     let failed = |cause| refused(&args.folder, &cause);
-    let bar = Console::new(args.quiet).spinner("looking for a place to stand");
+    let count = Counter::default();
+    let bar = watch(Console::new(args.quiet), "looking for a place to stand", (&map, &avatar), &count);
     let storeys = map.storeys(&avatar).map_err(|cause| failed(cause.into()))?;
     let found = match args.near {
         Some(Spot(near)) => avatar.nearest_standing(&map, near),
-        None => avatar.roomy_start(&map, &storeys),
+        None => avatar.roomy_start_watched(&map, &storeys, &mut |places| count.set(places as u64)),
     };
     drop(bar);
     let Some(Standing { position, distance }) = found.map_err(failed)? else {

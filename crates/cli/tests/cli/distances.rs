@@ -33,6 +33,21 @@ fn two_spheres_are_as_far_apart_as_they_are() {
     let people = [&asked[..5], &["--thickened", "0.25"]].concat();
     assert!(place.ok(&people).results.starts_with("They are 0."), "exact");
 
+    let near = ["distance", "one.xyz", "one.xyz", "--pose-b", &shift(2.3, 0.0, 0.0)];
+    let limits = " apart, more than the 10 % of --relative, because of this spacing.";
+    let told = place.ok(&near).results;
+    assert!(told.contains(limits), "{told}");
+    let exact = place.ok(&[&near[..], &["--json"]].concat()).json().remove(0);
+    let [least, most, band] = ["lower", "upper", "band"].map(|key| exact[key].as_f64().unwrap());
+    let stay: f64 =
+        told.split("The bounds stay ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((stay - (most - least)).abs() < 0.06 * stay, "{told}, {exact}");
+    assert!(most - least > 0.1 * most && most - least < 2.0 * band, "{exact}");
+    for options in [&["--relative", "0.5"][..], &["--thickened", "0.01"], &["--work", "40"]] {
+        let told = place.ok(&[&near[..], options].concat()).results;
+        assert!(!told.contains(limits), "{options:?}: {told}");
+    }
+
     let short = place.ok(&[&asked[..], &["--work", "40"]].concat()).json().remove(0);
     assert_eq!(short["complete"], false, "{short}");
     let bounds = ["lower", "upper"].map(|key| short[key].as_f64().unwrap());

@@ -27,14 +27,19 @@ fn scans_without_a_graph_are_refused_and_raw_ones_get_one() {
     place.cloud("ball.xyz", sphere(1.0), 0.08);
     place.ok(&["preprocess", "ball.xyz", "-o", "bare.nm", "--quiet"]);
     place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs", "--quiet"]);
-    for (scans, which) in
-        [(["bare.nm", "ball.nm"], "the first scan"), (["ball.nm", "bare.nm"], "the second scan")]
-    {
+    for scans in [["bare.nm", "ball.nm"], ["ball.nm", "bare.nm"]] {
         for flat in [&[][..], &["--flat"]] {
             let asked = [&["collide", scans[0], scans[1]], &METHOD[..], flat].concat();
-            place.refused(2, &asked, &[which, "--graph", "--method traversal"]);
+            let remedy = "`nearmiss preprocess INPUT -o bare.nm --graph`, or use --method traversal";
+            place.refused(2, &asked, &["bare.nm: expected a proximity graph in both scans", remedy]);
         }
     }
+    place.ok(&["preprocess", "ball.xyz", "-o", "graph.nm", "--graph", "--quiet"]);
+    let annulus = ["--flat", "--brackets", "annulus"];
+    let asked = [&["collide", "graph.nm", "ball.nm"], &METHOD[..], &annulus].concat();
+    place.refused(2, &asked, &["graph.nm: expected close pairs", "-o graph.nm --close-pairs`"]);
+    ask(&place, ["ball.nm", "graph.nm"], &annulus);
+    ask(&place, ["ball.xyz", "graph.nm"], &annulus);
     let touching = shift(1.2, 0.0, 0.0);
     for scans in [["ball.xyz", "ball.xyz"], ["ball.nm", "ball.xyz"], ["ball.xyz", "ball.nm"]] {
         for flat in [&[][..], &["--flat"]] {

@@ -103,6 +103,41 @@ fn a_pose_of_the_command_line_stands_for_what_lines_leave_out() {
     );
 }
 
+/// Few test points find no contact of balls that touch.
+#[test]
+fn without_a_known_clearance_none_is_told() {
+    let place = ball();
+    let lines: String = (0..8_u32).map(|i| format!("{} 0 0 0 0 0 1\n", 1.6 + 0.1 * f64::from(i))).collect();
+    place.write("path.txt", lines);
+    let method = ["--method", "sampling", "--test-points", "1", "--tolerance", "0.001"];
+    let args = ["collide", "ball.nm", "ball.nm", "--poses", "path.txt", "--csv", "t.csv", "--plot", "t.svg"];
+    let told = place.ok(&[&args[..], &method].concat()).results;
+    let table = std::fs::read_to_string(place.path("t.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let is_missed = |row: &[&str]| row[2] == "separated" && row[5..10].iter().all(|field| field.is_empty());
+    let missed: Vec<usize> = (0..8).filter(|&i| is_missed(&rows[i])).collect();
+    assert!(missed.first() == Some(&0) && missed.len() < 8, "contact at 1.6, none at 2.3: {table}");
+    for (i, line) in told.lines().take(8).enumerate() {
+        let is_unknown = line.ends_with("No contact found; no clearance is known (estimated).");
+        assert_eq!(is_unknown, missed.contains(&i), "{line}");
+        assert!(is_unknown || rows[i][6].parse::<f64>().unwrap() > 0.0, "{:?}", rows[i]);
+    }
+    let summary = told.lines().last().unwrap();
+    let poses = if missed.len() == 1 { "pose" } else { "poses" };
+    let expected = format!("No clearance is known for {} {poses} apart (first on line 1)", missed.len());
+    assert!(summary.contains(&expected), "{summary}");
+    assert!(!summary.contains("Smallest clearance without contact: 0,"), "{summary}");
+    let json = place.ok(&[&args[..5], &method, &["--json"]].concat()).json();
+    for answer in &json {
+        assert_eq!(answer["gap"].is_null(), answer["evidence"] == "estimated", "{answer}");
+    }
+    assert!(missed.iter().all(|&i| json[i]["gap"].is_null()), "{json:?}");
+    let plot = std::fs::read_to_string(place.path("t.svg")).unwrap();
+    let lines = plot.split("<polyline points=\"").skip(1).map(|line| line.split('"').next().unwrap());
+    let points: usize = lines.map(|line| line.split(' ').count()).sum();
+    assert_eq!(points, 8 - missed.len(), "{plot}");
+}
+
 #[test]
 fn a_path_is_summed_up_tabled_and_drawn() {
     let place = ball();

@@ -87,7 +87,7 @@ fn a_graph_is_made_where_it_is_asked_for() {
         &["export", "ball.nm", "--edges", "e.csv", "--close-pairs", "c.csv"],
         &["eval", "ball.nm", "--points", "ball.xyz", "--kernel", "geodesic"],
     ] {
-        place.refused(1, asked, &["ball.nm", "with `--close-pairs`"]);
+        place.refused(1, asked, &["ball.nm", "-o ball.nm --close-pairs`"]);
     }
     place.refused(2, &["preprocess", "ball.xyz", "-o", "ball.nm", "--scanner", "1,2"], &["--scanner"]);
 }

@@ -3,7 +3,9 @@
 
 use std::path::Path;
 
-use nearmiss_io::{Format, Model, Pieces, ReadError, read_bytes, read_in_pieces, read_mesh_bytes};
+use nearmiss_io::{
+    Format, Model, Pieces, ReadError, read_bytes, read_in_pieces, read_mesh_bytes, read_watched,
+};
 use proptest::prelude::*;
 
 use nearmiss_testdata::files;
@@ -39,6 +41,18 @@ fn check_pieces(bytes: &[u8], format: Option<Format>, name: &str) {
     let path = place.path().join(name);
     std::fs::write(&path, bytes).expect("a file");
     let whole = read_bytes(bytes, format, &path);
+    let mut told = 0;
+    match (&whole, read_watched(&path, format, &mut |points| told += points)) {
+        (Ok(whole), Ok(watched)) => {
+            // As text, because numbers may be NaN.
+            assert_eq!(format!("{whole:?}"), format!("{watched:?}"), "{name}");
+            let dropped = whole.cloud.dropped();
+            let given = whole.cloud.len() + dropped.duplicate + dropped.not_finite;
+            assert!(told == given || told == 0, "{name}: {told} of {given} points were told");
+        }
+        (Err(whole), Err(watched)) => assert_eq!(whole.to_string(), watched.to_string(), "{name}"),
+        (whole, watched) => panic!("{name}: {whole:?} in memory, {watched:?} watched"),
+    }
     for block in [30, 200] {
         let pieces = read_in_pieces(&path, format, block).and_then(|pieces| match pieces {
             Pieces::Mesh { vertices, .. } => Ok(vertices.positions),

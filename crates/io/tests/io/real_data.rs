@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use nearmiss_geometry::Aabb;
-use nearmiss_io::{Model, Pieces, PointPieces, ReadError, read, read_in_pieces};
+use nearmiss_io::{Model, Pieces, PointPieces, ReadError, read, read_in_pieces, read_watched};
 
 /// Returns the folder, unless it is missing or the variable `NEARMISS_NO_DATA` is set.
 #[expect(clippy::print_stdout, reason = "says why nothing is checked")]
@@ -242,4 +242,25 @@ fn a_part_of_a_copc_file_is_read_alone() {
     assert!(open().has_levels());
     let coarse = open().at_resolution(1.0);
     assert_eq!(count(coarse).0, 35_903, "the root alone");
+}
+
+#[test]
+fn files_read_in_blocks_equal_files_read_whole() {
+    let Some(data) = data() else { return };
+    for folder in ["formats", "scans", "objects"] {
+        for entry in data.join(folder).read_dir().unwrap() {
+            let path = entry.unwrap().path();
+            let mut told = 0;
+            match (read(&path, None), read_watched(&path, None, &mut |points| told += points)) {
+                (Ok(whole), Ok(watched)) => {
+                    assert!(format!("{whole:?}") == format!("{watched:?}"), "{}", path.display());
+                    let dropped = whole.cloud.dropped();
+                    let given = whole.cloud.len() + dropped.duplicate + dropped.not_finite;
+                    assert!(told == given || told == 0, "{}: {told} of {given}", path.display());
+                }
+                (Err(whole), Err(watched)) => assert_eq!(whole.to_string(), watched.to_string()),
+                (whole, _) => panic!("{}: {:?} whole only", path.display(), whole.err()),
+            }
+        }
+    }
 }

@@ -1,8 +1,8 @@
 //! Curves with the kernel of the placed scan, and curves of saved scans.
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
-    BuildOptions, Check, Curve, CurveOptions, CurvePlan, Curves, GraphOptions, Pair, PlanError, PointCloud,
-    Pose, Scan, Scratch,
+    BuildOptions, Check, Curve, CurveOptions, CurvePlan, Curves, GraphOptions, Pair, Paths, PlanError,
+    PointCloud, Pose, Scan, Scratch,
 };
 use nearmiss_testdata::shapes::{Sampling, plates, sphere};
 
@@ -18,7 +18,10 @@ fn draw(a: &Scan, b: &Scan, pose: &Pose) -> Curves {
 fn both(points: &[[f64; 3]]) -> [Scan; 2] {
     let cloud = PointCloud::from_positions(points).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
-    let along = scan.clone().with_graph(&cloud, &GraphOptions::default(), None).unwrap();
+    let along = scan
+        .clone()
+        .with_graph(&cloud, &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)), None)
+        .unwrap();
     [scan, along.with_geodesic_kernel().unwrap()]
 }
 

@@ -7,8 +7,8 @@ use nearmiss::hierarchy::HierarchyMeta;
 use nearmiss::store::Writer;
 use nearmiss::{
     Answer, BatchScratch, BuildOptions, Check, CollideOptions, CollidePlan, Evidence, GraphError,
-    GraphOptions, Metric, Pair, Placed, PlanError, PointCloud, PointKind, Pose, Scan, Scratch, Semantics,
-    Until, Verdict, World, each,
+    GraphOptions, Metric, Pair, Paths, Placed, PlanError, PointCloud, PointKind, Pose, Scan, Scratch,
+    Semantics, Until, Verdict, World, each,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
@@ -19,7 +19,9 @@ use serde::Serialize;
 fn both(points: &[[f64; 3]]) -> [Scan; 2] {
     let cloud = PointCloud::from_positions(points).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
-    let scan = scan.with_graph(&cloud, &GraphOptions::default(), None).unwrap();
+    let scan = scan
+        .with_graph(&cloud, &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)), None)
+        .unwrap();
     [scan.clone(), scan.with_geodesic_kernel().unwrap()]
 }
 
@@ -250,13 +252,15 @@ fn without_the_map_there_is_no_such_scan() {
     let graph = |pairs| {
         bare.clone().with_graph(&cloud, &GraphOptions::default().with_close_pairs(pairs), None).unwrap()
     };
-    let (without, whole) =
-        (graph(None), graph(Some(nearmiss::Paths::Rebuilt)).with_geodesic_kernel().unwrap());
+    let (without, whole) = (graph(None), graph(Some(Paths::Rebuilt)).with_geodesic_kernel().unwrap());
     for scan in [&bare, &without] {
         assert_eq!(scan.clone().with_geodesic_kernel().unwrap_err(), GraphError::NoClosePairs);
     }
     // A new graph replaces the old one in the kernel if it has a map of close pairs.
-    let other = whole.clone().with_graph(&cloud, &GraphOptions::default(), None).unwrap();
+    let other = whole
+        .clone()
+        .with_graph(&cloud, &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)), None)
+        .unwrap();
     assert_eq!(other.metric(), Metric::Geodesic);
     let options = GraphOptions::default().with_close_pairs(None);
     assert_eq!(whole.clone().with_graph(&cloud, &options, None).unwrap_err(), GraphError::NoClosePairs);

@@ -10,7 +10,7 @@ use nearmiss_testdata::arbitrary::{self, CloudKind};
 fn small() -> Scan {
     let cloud = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 100, 1)).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
-    scan.with_graph(&cloud, &GraphOptions::default(), None).unwrap()
+    scan.with_graph(&cloud, &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)), None).unwrap()
 }
 
 fn bytes(scan: &Scan) -> Vec<u8> {
@@ -114,7 +114,8 @@ fn normals_are_turned_outwards_to_the_scanner_or_as_given() {
     let ball = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 2000, 5)).unwrap();
     let scan = |cloud: &PointCloud, scanner| {
         let scan = Scan::build(cloud, &BuildOptions::default()).unwrap();
-        scan.with_graph(cloud, &GraphOptions::default(), scanner).unwrap()
+        scan.with_graph(cloud, &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)), scanner)
+            .unwrap()
     };
     let outwards = |scan: &Scan| {
         let along = |(p, n): (&[f32; 3], &[f32; 3])| (0..3).map(|k| p[k] * n[k]).sum::<f32>();

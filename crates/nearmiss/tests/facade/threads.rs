@@ -16,7 +16,7 @@ const ROUNDS: usize = 256;
 fn threads_of_a_pool_that_want_levels_at_once_do_not_wait_for_each_other_for_ever() {
     let cloud = PointCloud::from_positions(dragon_mesh(Dragon::Points23k).unwrap().vertices()).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
-    let scan = scan.with_graph(&cloud, &GraphOptions::default().with_close_pairs(None), None).unwrap();
+    let scan = scan.with_graph(&cloud, &GraphOptions::default(), None).unwrap();
     let (done, all_done) = mpsc::channel();
     std::thread::spawn(move || {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(16).build().unwrap();

@@ -13,6 +13,9 @@ use crate::pair::meter::Meter;
 use crate::pair::placed::Placed;
 use crate::pair::scan_pair::{ScanPair, relative};
 
+/// The contacts that are divided between two reports of the progress.
+const TOLD: usize = 4096;
+
 /// Near contacts, divided into those linked to hard contacts and all others.
 pub(crate) struct NearContacts {
     /// For each hard group, the near contacts around it, in ascending order.
@@ -24,8 +27,16 @@ pub(crate) struct NearContacts {
 
 impl NearContacts {
     /// Divides the near contacts. The first `hard_count` of `contacts` are hard, and `hard` holds
-    /// their groups.
-    pub(crate) fn new(contacts: &[Contact], hard_count: usize, hard: &[ContactGroup], link: f64) -> Self {
+    /// their groups. Passes the share of the near contacts that are divided to `told`, again and
+    /// again.
+    pub(crate) fn new(
+        contacts: &[Contact],
+        hard_count: usize,
+        hard: &[ContactGroup],
+        link: f64,
+        told: &mut dyn FnMut(f64),
+    ) -> Self {
+        let mut divided = 0_usize;
         let of_groups = hard.iter().enumerate().flat_map(|(number, group)| {
             group.contacts.iter().map(move |&i| GeomWithData::new(contacts[i].point, number))
         });
@@ -39,6 +50,11 @@ impl NearContacts {
                 continue;
             }
             for i in group.contacts.into_iter().filter(|&i| i >= hard_count) {
+                divided += 1;
+                if divided.is_multiple_of(TOLD) {
+                    #[expect(clippy::cast_precision_loss, reason = "a share")]
+                    told(divided as f64 / (contacts.len() - hard_count) as f64);
+                }
                 if let Some(nearest) = tree.nearest_neighbor(contacts[i].point) {
                     surroundings[nearest.data].push(i);
                 }

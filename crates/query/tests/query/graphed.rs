@@ -1,7 +1,7 @@
 //! Scans with their graphs.
 
 use nearmiss_geometry::{PointCloud, Pose};
-use nearmiss_graph::{GraphOptions, Sides, SurfaceGraph, SurfaceSamples};
+use nearmiss_graph::{GraphOptions, Paths, Sides, SurfaceGraph, SurfaceSamples};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::Placed;
 
@@ -21,7 +21,13 @@ impl Scan {
         let mut normals = tree.normals().to_vec();
         let samples = SurfaceSamples { plan: tree.plan(), positions: tree.positions(), radii: tree.radii() };
         let sides = Sides { normals: own.as_deref(), scanner: None };
-        let graph = SurfaceGraph::build(samples, sides, &mut normals, &GraphOptions::default()).unwrap();
+        let graph = SurfaceGraph::build(
+            samples,
+            sides,
+            &mut normals,
+            &GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt)),
+        )
+        .unwrap();
         tree.turn_normals(&normals);
         Self { tree, graph }
     }

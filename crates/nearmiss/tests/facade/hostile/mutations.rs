@@ -52,9 +52,9 @@ fn samples() -> Vec<Sample> {
     };
     let bare = kinds.into_iter().map(sample);
     let graphs = [
-        (CloudKind::Sphere, 400, GraphOptions::default()),
+        (CloudKind::Sphere, 400, GraphOptions::default().with_close_pairs(Some(Paths::Rebuilt))),
         (CloudKind::Clustered, 300, GraphOptions::default().with_close_pairs(Some(Paths::Stored))),
-        (CloudKind::FarClusters, 330, GraphOptions::default().with_close_pairs(None)),
+        (CloudKind::FarClusters, 330, GraphOptions::default()),
     ];
     let joined = |(kind, n, options): (CloudKind, u32, GraphOptions)| {
         let cloud = PointCloud::cleaned(&arbitrary::cloud(kind, n, 7)).unwrap();
