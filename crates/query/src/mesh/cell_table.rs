@@ -19,6 +19,13 @@ const SIDE: usize = CELLS + 1;
 /// The greatest number x of shared cells.
 pub(crate) const MOST_SHARED: u32 = 16;
 
+/// The mean of c for two counts of filled cells. It orders pairs as the probability does, and does
+/// not saturate.
+#[inline]
+pub(crate) fn expected([a, b]: [f32; 2]) -> f32 {
+    a * b * (1.0 / CELLS as f32)
+}
+
 /// Pr[c < x] for every pair of counts. The complement keeps its precision where a collision is all
 /// but certain.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,5 @@
-//! Node pairs compared by overlap and by the probability that their surfaces collide.
+//! Node pairs compared by overlap, the most probable collision first. Keys are the numbers of cells
+//! that both surfaces are expected to fill, negated.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16};
@@ -8,15 +9,15 @@ use nearmiss_hierarchy::{
 };
 use nearmiss_lanes::wide::{Bits, bits, product, repeated, spread};
 
-use crate::mesh::cell_table::CellTable;
+use crate::mesh::cell_table::expected;
 
 const LANES: usize = 16;
 
 /// The callbacks of a descent by probability ([`Odds`]).
 pub(crate) trait OddsVisitor: PairVisitor {
-    /// Called with a pair whose boxes overlap, with the probability that its surfaces do not
-    /// collide. Returns the key of the pair.
-    fn likely(&mut self, pair: NodePair, fewer: f32) -> f32;
+    /// Called with a pair whose boxes overlap, with the number of cells of their intersection that
+    /// each surface fills well.
+    fn overlapping(&mut self, pair: NodePair, filled: [f32; 2]);
 }
 
 /// Two trees under a relative pose, compared by the probability of a collision.
@@ -26,7 +27,6 @@ pub(crate) struct Odds<'a> {
     pub(crate) relative: &'a Relative,
     /// The well-filled cells of each node; empty if they were not counted.
     pub(crate) cells: [&'a [u8]; 2],
-    pub(crate) table: &'a CellTable,
 }
 
 /// The count of filled cells of nodes whose cells were not counted: that of a sheet.
@@ -163,7 +163,8 @@ impl<V: OddsVisitor> Comparison<V> for Odds<'_> {
                 self.filled(1, j) * shares[1][lane % LANES].cbrt(),
             ];
             let pair = NodePair { a: NodeId(i), b: NodeId(j) };
-            let key = visitor.likely(pair, self.table.fewer(filled));
+            visitor.overlapping(pair, filled);
+            let key = -expected(filled);
             most.add(Open { pair, key }, frontier);
         }
         (lanes.count_ones(), most.finish(simd, frontier))

@@ -1,7 +1,7 @@
 //! A pair of placed meshes and the questions about it.
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::{Heap, Stack};
+use nearmiss_hierarchy::{Heap, Open, Stack};
 
 use crate::ask::answer::Statistics;
 use crate::ask::budget::Budget;
@@ -22,6 +22,8 @@ pub struct MeshScratch {
     stack: Stack,
     open: Frontier,
     heap: Heap,
+    /// The pairs that are open when a time-critical search stops.
+    left: Vec<Open>,
     table: Option<CellTable>,
 }
 
@@ -36,7 +38,14 @@ impl MeshScratch {
     /// available ones, for comparisons. Answers do not depend on it.
     #[must_use]
     pub fn by_level(level: Level) -> Self {
-        Self { level, stack: Stack::default(), open: Frontier::default(), heap: Heap::default(), table: None }
+        Self {
+            level,
+            stack: Stack::default(),
+            open: Frontier::default(),
+            heap: Heap::default(),
+            left: Vec::new(),
+            table: None,
+        }
     }
 }
 
@@ -158,9 +167,9 @@ impl<'a> MeshPair<'a> {
         if scratch.table.as_ref().is_none_or(|table| table.shared() != quality.shared) {
             scratch.table = Some(CellTable::new(quality.shared.clamp(1, MOST_SHARED)));
         }
-        let MeshScratch { level, heap, table, .. } = scratch;
+        let MeshScratch { level, heap, left, table, .. } = scratch;
         let Some(table) = table else { return INVALID };
-        self.ask(*level, |pair| time_critical::collide(pair, quality, table, heap)).unwrap_or(INVALID)
+        self.ask(*level, |pair| time_critical::collide(pair, quality, table, (heap, left))).unwrap_or(INVALID)
     }
 
     /// Like [`Self::collide`], but tries the triangles of `hint` first, and updates it.
