@@ -40,7 +40,7 @@ pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan,
     Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, Contacts, Curve, CurveEnd, CurveOptions,
     CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence, Interpolation,
-    ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair, MeshScratch, MeshVerdict,
+    ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict,
     Method, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedMesh, PlanError, Prepared, Proof,
     Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize,
     Until, Verdict, World, each,

@@ -295,6 +295,9 @@ pub enum PlanError {
         "the methods `sampling` and `interpolation` compare surfaces, without a margin; leave the margin and the thickness out"
     )]
     SamplingAlone,
+    /// The option is for two scans; a mesh and a scan are compared without it.
+    #[error("expected the default method and order for a mesh and a scan, got {0}; leave it out")]
+    NotForMeshes(&'static str),
     /// The surfaces of the two scans are defined by different metrics.
     #[error(
         "one scan is prepared for the {} kernel, the other for the {} one; prepare both for the same",
