@@ -40,10 +40,10 @@ pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan,
     Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, Contacts, Curve, CurveEnd, CurveOptions,
     CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence, Interpolation,
-    ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict,
-    Method, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedMesh, PlanError, Prepared, Proof,
-    Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize,
-    Until, Verdict, World, each,
+    ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair, MeshScanPair, MeshScanPlan,
+    MeshScratch, MeshVerdict, Method, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedMesh,
+    PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
+    ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -113,8 +113,7 @@ impl Apart<'_, '_> {
         let lower = if self.search.of_enclosures { self.search.lower(open) } else { 0.0 };
         let found = Distance { lower, complete: flow.is_continue(), ..self.samples() };
         let is_worth = !of_obstacles || self.search.best.distance <= FAR_FEET * found.band;
-        let feet =
-            if flow.is_continue() && is_worth { self.approach(&mut contact.gathers[0]) } else { None };
+        let feet = if flow.is_continue() && is_worth { self.approach(&mut contact.gathers[0]) } else { None };
         let found = match feet {
             Some((points, upper)) if !of_obstacles || upper < found.upper => {
                 Distance { upper, points, evidence: Evidence::Certified, ..found }

@@ -75,8 +75,7 @@ impl MeshScanPairing<'_> {
         let to_box = triangles.gaps_to_box(self.level, &bounds);
         let mut most = self.most(best.distance);
         for block in blocks_of(points) {
-            let balls =
-                if self.part == Part::Obstacle { self.a.obstacle_balls(block) } else { [0.0; WIDTH] };
+            let balls = if self.part == Part::Obstacle { self.a.obstacle_balls(block) } else { [0.0; WIDTH] };
             for lane in self.lanes(leaf) {
                 // The box contains the balls.
                 if to_box[lane] - 3.0 * self.relative.slack() > most {

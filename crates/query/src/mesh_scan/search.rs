@@ -129,7 +129,8 @@ impl<'s, 'a> Search<'s, 'a> {
         let points = &leaves.points(a);
         let reach = self.reach + 2.0 * self.pair.relative.slack();
         for block in blocks_of(points) {
-            let balls = if of_obstacle { self.pair.a.obstacle_balls(block) } else { self.sparse_balls(block) };
+            let balls =
+                if of_obstacle { self.pair.a.obstacle_balls(block) } else { self.sparse_balls(block) };
             for lane in self.pair.lanes(b) {
                 let positions = &self.pair.a.blocks[block].position;
                 let near = triangles.get(lane).balls_near(self.pair.level, positions, &balls, reach);
@@ -168,12 +169,7 @@ impl<'s, 'a> Search<'s, 'a> {
         balls
     }
 
-    fn contact_of_ball(
-        &self,
-        items: [usize; 2],
-        foot: [f64; 3],
-        (distance, ball): (f64, f64),
-    ) -> Contact {
+    fn contact_of_ball(&self, items: [usize; 2], foot: [f64; 3], (distance, ball): (f64, f64)) -> Contact {
         let [p, q] = [self.pair.a.position(items[0]).map(f64::from), foot].map(Vector3::from);
         // In the middle of the overlap, or of the gap within the margin.
         let share = if distance > 0.0 { (0.5 * (ball + distance) / distance).min(1.0) } else { 1.0 };
