@@ -13,6 +13,7 @@ mod eigen;
 mod evaluation;
 mod geodesics;
 mod hints;
+mod mesh_scans;
 mod reading;
 mod scans;
 mod shapes;
@@ -58,6 +59,8 @@ enum Command {
     Geodesics(geodesics::Arguments),
     /// Time that hints save in small motions near contact
     Hints(hints::Arguments),
+    /// An object's mesh against scans, beside its points
+    MeshScans(mesh_scans::Options),
     /// The speed of reading point files
     Reading(reading::Options),
     /// Decided and certified shares on real scans
@@ -86,6 +89,7 @@ fn main() -> Result<(), Failure> {
         Command::Evaluation(arguments) => evaluation::run(&arguments),
         Command::Geodesics(arguments) => geodesics::run(&arguments),
         Command::Hints(arguments) => hints::run(&arguments),
+        Command::MeshScans(options) => mesh_scans::run(&options),
         Command::Reading(options) => reading::run(&options),
         Command::Scans(options) => scans::run(&options),
         Command::Shapes(arguments) => shapes::run(&arguments),

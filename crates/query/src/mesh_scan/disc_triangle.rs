@@ -130,3 +130,34 @@ impl FlatDisc {
         0.5 * (low + high)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_of_known_arrangements_are_found() {
+        let disc = FlatDisc { centre: Vector3::zeros(), normal: Vector3::z(), radius: 1.0 };
+        let moved = |triangle: [[f64; 3]; 3], by: [f64; 3]| triangle.map(|p| [0, 1, 2].map(|k| p[k] + by[k]));
+        let lying = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
+        let upright = [[-9.0, 0.0, 0.0], [9.0, 0.0, 0.0], [0.0, 0.0, 9.0]];
+        // Rises by 45° from a line far beside the disc.
+        let slanted = [[-9.0, -9.0, -9.0], [-9.0, 9.0, -9.0], [99.0, 0.0, 99.0]];
+        let cases = [
+            (lying, [0.0, 0.0, 0.3], 0.3, "above all of the disc"),
+            (lying, [0.0, 0.0, 0.0], 0.0, "in its plane"),
+            (upright, [0.0, 0.5, 0.2], 0.2, "an edge above"),
+            (upright, [0.0, 0.5, -0.2], 0.0, "across"),
+            (upright, [0.0, 3.0, -0.2], 2.0, "beside"),
+            (upright, [0.0, 4.0, 4.0], 5.0, "beside and above"),
+            (slanted, [0.0, 0.0, 2.0], 0.5_f64.sqrt(), "the rim below the face"),
+            ([[1.0, 0.0, 0.0]; 3], [0.5, 0.0, 0.0], 0.5, "a point"),
+        ];
+        for (triangle, by, distance, what) in cases {
+            let found = disc.nearest_to(&moved(triangle, by));
+            assert!((found.distance - distance).abs() < 1e-9, "{what}: {found:?}, expected {distance}");
+            let apart = (found.on_triangle - found.on_disc).norm();
+            assert!((apart - distance).abs() < 1e-9, "{what}: {found:?}");
+        }
+    }
+}

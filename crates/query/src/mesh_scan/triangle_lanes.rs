@@ -248,3 +248,58 @@ impl LeafTriangles {
         ))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_mesh::nearest_on_triangle;
+    use nearmiss_testdata::arbitrary::{point_in, rng};
+    use nearmiss_testdata::instructions::levels;
+    use rand::RngExt;
+
+    use super::*;
+
+    #[test]
+    fn distances_are_below_those_in_double_precision_and_near_them() {
+        let rng = &mut rng(61);
+        let (mut share, mut count) = (0.0, 0.0);
+        for round in 0..3000_usize {
+            let wide = [1.0, 30.0, 1e-3, 1e4][round % 4];
+            let [p, along] = [point_in(rng, 1.0), point_in(rng, wide)];
+            // From a right triangle to a needle without area.
+            let thin = [1.0, 1e-2, 1e-4, 1e-6, 0.0][round % 5] * wide;
+            let [q, r] = [1.0, rng.random_range(-1.0..1.0)].map(|t: f64| {
+                let beside = point_in(rng, thin);
+                [0, 1, 2].map(|k| p[k] + t * along[k] + beside[k])
+            });
+            let corners = [p, q, r].map(single);
+            let slack = 1e-7;
+            let triangle = LaneTriangle::new(corners, slack);
+            let mut positions = [[0.0; 16]; 3];
+            for lane in 0..16 {
+                let place = single(point_in(rng, 2.0));
+                (0..3).for_each(|k| positions[k][lane] = place[k]);
+            }
+            let found: Vec<_> =
+                levels().into_iter().map(|level| triangle.distances_of(level, &positions)).collect();
+            assert!(found.iter().all(|other| *other == found[0]), "every level: {found:?}");
+            for lane in 0..16 {
+                let place = [0, 1, 2].map(|k| f64::from(positions[k][lane]));
+                let foot = nearest_on_triangle(&corners.map(|corner| corner.map(f64::from)), place);
+                let exact = (0..3).map(|k| (place[k] - foot[k]).powi(2)).sum::<f64>().sqrt();
+                let bound = f64::from(found[0][lane]);
+                assert!(bound <= exact, "round {round}: {bound}, is {exact}, {corners:?}");
+                if wide < 100.0 && exact > 0.1 {
+                    (share, count) = (share + bound / exact, count + 1.0);
+                }
+            }
+        }
+        assert!(count > 10_000.0 && share / count > 0.999, "{share} of {count}");
+    }
+
+    #[test]
+    fn triangles_out_of_range_bound_nothing() {
+        let triangle = LaneTriangle::new([[1e20, 0.0, 0.0], [0.0; 3], [0.0, f32::INFINITY, 0.0]], 1.0);
+        let found = triangle.distances_of(Level::new(), &[[5.0; 16]; 3]);
+        assert!(found.iter().all(|&bound| bound == f32::NEG_INFINITY), "{found:?}");
+    }
+}
