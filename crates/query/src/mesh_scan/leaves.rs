@@ -8,6 +8,7 @@ use nearmiss_lanes::wide::{Bits, blocks_of, lanes_of};
 use nearmiss_mesh::{Corners, nearest_on_triangle};
 
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
+use crate::mesh_scan::triangle_lanes::LeafTriangles;
 use crate::pair::pairing::ItemPair;
 
 const WIDTH: usize = PointBlock::WIDTH;
@@ -20,27 +21,19 @@ impl MeshScanPairing<'_> {
     /// points and, for obstacles, from the points less their reaches.
     pub(crate) fn gap_of_two_leaves(&self, pair: NodePair) -> f32 {
         let leaf = self.b.tree.topology().leaf_number(pair.b);
-        let triangles = self.triangles(leaf);
+        let (triangles, lanes) = (self.triangles(leaf), self.lanes(leaf).0);
         let enclosure = self.a.tree.enclosure(self.part, pair.a);
-        let to_box = triangles.gaps_to_box(self.level, &enclosure);
-        let points = &self.a.tree.topology().points(pair.a);
-        let mut least = [f32::INFINITY; 4];
-        if self.part == Part::Obstacle {
-            for block in blocks_of(points) {
-                let (reaches, lanes) = (self.a.obstacle_reaches(block), lanes_of(block, points));
-                for lane in self.lanes(leaf) {
-                    let triangle = triangles.get(lane);
-                    let positions = &self.a.blocks[block].position;
-                    let gap = triangle.least_gap(self.level, positions, &reaches, lanes);
-                    least[lane] = least[lane].min(gap);
-                }
-            }
-        } else {
-            least = [f32::NEG_INFINITY; 4];
+        if self.part == Part::Surface {
+            return triangles.least_gap(lanes, &enclosure, None);
         }
-        let slack = 2.0 * self.relative.slack();
-        let gap = |lane: usize| least[lane].max(to_box[lane] - slack);
-        self.lanes(leaf).map(gap).fold(f32::INFINITY, f32::min)
+        let points = &self.a.tree.topology().points(pair.a);
+        let mut least = f32::INFINITY;
+        for block in blocks_of(points) {
+            let reaches = self.a.obstacle_reaches(block);
+            let of_block = (&self.a.blocks[block].position, &reaches, lanes_of(block, points));
+            least = least.min(triangles.least_gap(lanes, &enclosure, Some(of_block)));
+        }
+        least
     }
 
     /// The distance of a point and a triangle, given by its corners in the scan's stored frame.
@@ -70,22 +63,17 @@ impl MeshScanPairing<'_> {
     pub(crate) fn nearest_items(&mut self, leaves: NodePair, mut best: ItemPair) -> ItemPair {
         let leaf = self.b.tree.topology().leaf_number(leaves.b);
         let points = &self.a.tree.topology().points(leaves.a);
-        let triangles = self.triangles(leaf);
+        let relative = self.relative;
+        let triangles = LeafTriangles { level: self.level, block: &self.b.blocks[leaf], relative: &relative };
+        // The box contains the balls.
         let bounds = self.a.tree.bounds(leaves.a);
-        let to_box = triangles.gaps_to_box(self.level, &bounds);
         let mut most = self.most(best.distance);
         for block in blocks_of(points) {
             let balls = if self.part == Part::Obstacle { self.a.obstacle_balls(block) } else { [0.0; WIDTH] };
+            let positions = &self.a.blocks[block].position;
+            let Some(gaps) = triangles.point_gaps(positions, &balls, &bounds, most) else { continue };
             for lane in self.lanes(leaf) {
-                // The box contains the balls.
-                if to_box[lane] - 3.0 * self.relative.slack() > most {
-                    continue;
-                }
-                let positions = &self.a.blocks[block].position;
-                let mut gaps = triangles.get(lane).distances_of(self.level, positions);
-                for (gap, ball) in gaps.iter_mut().zip(&balls) {
-                    *gap -= ball;
-                }
+                let gaps = &gaps[lane];
                 let mut left = lanes_of(block, points);
                 let mut corners = None;
                 while let Some(i) = Bits(left).min_by(|&i, &j| gaps[i].total_cmp(&gaps[j])) {

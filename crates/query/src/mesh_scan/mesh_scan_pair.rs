@@ -107,8 +107,8 @@ impl<'a> MeshScanPairing<'a> {
     }
 
     /// The triangles of a leaf of the mesh, by its number, in the scan's stored frame.
-    pub(crate) fn triangles(&self, leaf: usize) -> LeafTriangles {
-        LeafTriangles::new(self.level, &self.b.blocks[leaf], &self.relative)
+    pub(crate) fn triangles(&self, leaf: usize) -> LeafTriangles<'_> {
+        LeafTriangles { level: self.level, block: &self.b.blocks[leaf], relative: &self.relative }
     }
 
     /// The lanes of the triangles of a leaf.

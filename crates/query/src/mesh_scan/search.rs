@@ -16,7 +16,7 @@ use crate::ask::answer::{Contact, Evidence, Reason};
 use crate::ask::options::{CollideOptions, Detail};
 use crate::mesh_scan::disc_triangle::{FlatDisc, Nearest};
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
-use crate::mesh_scan::triangle_lanes::LeafTriangles;
+use crate::mesh_scan::triangle_lanes::discs_reach_box;
 use crate::mesh_scan::witness::Witness;
 use crate::pair::pairing::Pairing;
 use crate::pair::placed::ViewScratch;
@@ -89,10 +89,9 @@ impl<'s, 'a> Search<'s, 'a> {
     /// Compares the points of a leaf with the triangles of another and records a contact.
     fn compare(&mut self, leaves: [usize; 2], nodes: NodePair) -> ControlFlow<()> {
         self.pair.count(leaves);
-        let triangles = self.pair.triangles(leaves[1]);
-        let contact = match self.ball_contact(leaves, &triangles) {
+        let contact = match self.ball_contact(leaves) {
             Some(contact) => Some(contact),
-            None => self.disc_contact(leaves, &triangles),
+            None => self.disc_contact(leaves),
         };
         let Some(contact) = contact else {
             if let Some(compared) = &mut self.compared {
@@ -109,6 +108,27 @@ impl<'s, 'a> Search<'s, 'a> {
         self.pair.meter.go_on()
     }
 
+    /// Returns `true` if no disc or ball of a leaf of the scan reaches the box of a node of the mesh.
+    fn is_beside(&self, pair: NodePair) -> bool {
+        let (pair, a, nodes) = (&self.pair, self.pair.a, pair);
+        let [is_leaf, _] = pair.which_are_leaves(nodes);
+        if !is_leaf {
+            return false;
+        }
+        let leaf = a.tree.topology().leaf_number(nodes.a);
+        if pair.part == Part::Obstacle && a.leaves.has_balls(leaf) {
+            return pair.gap_of_leaf_boxes(nodes) > self.reach;
+        }
+        if pair.part == Part::Surface && a.leaves.is_sparse(leaf) {
+            return false;
+        }
+        let bounds = pair.relative.moved(&pair.b.tree.bounds(nodes.b));
+        let most = (self.reach, pair.relative.slack());
+        !a.leaves
+            .blocks(leaf)
+            .any(|(block, _, count)| discs_reach_box(pair.level, (block, count), &bounds, most))
+    }
+
     /// Records a contact of point `i`, first with the evidence so far.
     fn record(&mut self, i: usize, contact: Contact, evidence: Evidence) {
         if self.found.is_none_or(|(_, known)| known == Evidence::Estimated && evidence == Evidence::Certified)
@@ -120,21 +140,23 @@ impl<'s, 'a> Search<'s, 'a> {
 
     /// The first contact of a ball and a triangle of two leaves. Records it. Notes a doubt where a
     /// triangle comes near a sparse point of a surface.
-    fn ball_contact(&mut self, [a, b]: [usize; 2], triangles: &LeafTriangles) -> Option<Contact> {
+    fn ball_contact(&mut self, [a, b]: [usize; 2]) -> Option<Contact> {
         let of_obstacle = self.pair.part == Part::Obstacle;
         let leaves = self.pair.a.leaves;
         if !(if of_obstacle { leaves.has_balls(a) } else { leaves.is_sparse(a) }) {
             return None;
         }
         let points = &leaves.points(a);
+        // The box contains the balls.
+        let bounds = self.pair.a.tree.bounds(self.pair.a.tree.topology().leaf(a));
         let reach = self.reach + 2.0 * self.pair.relative.slack();
         for block in blocks_of(points) {
             let balls =
                 if of_obstacle { self.pair.a.obstacle_balls(block) } else { self.sparse_balls(block) };
+            let positions = &self.pair.a.blocks[block].position;
+            let near = self.pair.triangles(b).balls_near(positions, &balls, &bounds, reach);
             for lane in self.pair.lanes(b) {
-                let positions = &self.pair.a.blocks[block].position;
-                let near = triangles.get(lane).balls_near(self.pair.level, positions, &balls, reach);
-                for of_block in Bits(near & lanes_of(block, points)) {
+                for of_block in Bits(near[lane] & lanes_of(block, points)) {
                     let i = block * WIDTH + of_block;
                     let j = MeshScanPairing::triangle(b, lane);
                     self.pair.meter.leaf_work(1);
@@ -183,26 +205,19 @@ impl<'s, 'a> Search<'s, 'a> {
 
     /// The first contact of a disc and a triangle of two leaves. Records it, or the first of a few
     /// that is verified.
-    fn disc_contact(&mut self, [a, b]: [usize; 2], triangles: &LeafTriangles) -> Option<Contact> {
+    fn disc_contact(&mut self, [a, b]: [usize; 2]) -> Option<Contact> {
         let leaves = self.pair.a.leaves;
         if self.pair.part == Part::Obstacle && leaves.points(a).start >= self.pair.a.dense {
             return None;
         }
         let mut first = None;
         let reach = self.reach + 2.0 * self.pair.relative.slack();
-        let bounds = self.pair.a.tree.bounds(self.pair.a.tree.topology().leaf(a));
-        let gaps = triangles.gaps_to_box(self.pair.level, &bounds);
-        for lane in self.pair.lanes(b) {
-            // The box contains the discs.
-            if gaps[lane] > reach + self.pair.relative.slack() {
-                continue;
-            }
-            let triangle = triangles.get(lane);
-            let j = MeshScanPairing::triangle(b, lane);
-            let mut corners = None;
-            for (block, from, count) in leaves.blocks(a) {
-                let near = triangle.discs_near(self.pair.level, block, reach) & ((1 << count) - 1);
-                for i in Bits(near).map(|lane| from + lane) {
+        for (block, from, count) in leaves.blocks(a) {
+            let near = self.pair.triangles(b).discs_near(block, reach);
+            for lane in self.pair.lanes(b) {
+                let j = MeshScanPairing::triangle(b, lane);
+                let mut corners = None;
+                for i in Bits(near[lane] & ((1 << count) - 1)).map(|lane| from + lane) {
                     if self.pair.part == Part::Obstacle && !self.pair.a.is_on_sheet(i) {
                         continue;
                     }
@@ -291,7 +306,7 @@ impl PairVisitor for Search<'_, '_> {
 
     #[inline]
     fn is_apart(&mut self, pair: NodePair) -> bool {
-        self.pair.part == Part::Obstacle && self.pair.gap_by_points(pair).is_some_and(|gap| gap > self.reach)
+        self.is_beside(pair)
     }
 
     fn leaf_pair(&mut self, leaves: [usize; 2], open: &Open) -> ControlFlow<()> {
