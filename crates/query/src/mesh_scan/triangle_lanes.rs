@@ -19,8 +19,8 @@ const NEEDLE: f32 = 2e-4;
 /// shortens a height by half the square of that.
 const RELATIVE: f32 = 1e-5;
 
-/// Rounding error along an edge, relative to the longest edge.
-const OF_EDGES: f32 = 2e-6;
+/// Rounding error along an edge and of the plane within the triangle, relative to the longest edge.
+const OF_EDGES: f32 = 4e-6;
 
 /// The number of steps of a position or normal in a [`LeafBlock`].
 const STEPS: f32 = 32767.0;
@@ -132,6 +132,18 @@ impl Prepared {
         let [p, q, r] =
             [cross(&along[0], &along[1]), cross(&along[1], &along[2]), cross(&along[2], &along[0])];
         let normal = [p[0] + q[0] + r[0], p[1] + q[1] + r[1], p[2] + q[2] + r[2]];
+        // Rounding tilts this sum by more the thinner a triangle is. A tilt along its longest edge would
+        // move the far end of the plane.
+        let mut axis = along[2];
+        for (edge, length) in [(along[1], lengths[1]), (along[0], lengths[0])] {
+            let is_longest: mask32x4<S> = length.simd_eq(longest);
+            axis = [
+                is_longest.select(edge[0], axis[0]),
+                is_longest.select(edge[1], axis[1]),
+                is_longest.select(edge[2], axis[2]),
+            ];
+        }
+        let normal = minus(&normal, &times(&axis, product(axis, normal)));
         let sines = product(normal, normal).sqrt();
         let is_face: mask32x4<S> = sines.simd_gt(f32x4::splat(simd, NEEDLE));
         let normal = times(&normal, per_length(simd, sines));
