@@ -257,8 +257,7 @@ impl<'s, 'a> Search<'s, 'a> {
         };
         let most = (self.margin / placed.scale()).max(f64::from(THICKNESS) * disc.radius);
         let Nearest { distance, on_triangle, on_disc } = disc.nearest_to(corners);
-        // This is `false` for NaN.
-        if !(distance <= most) {
+        if distance > most || distance.is_nan() {
             return None;
         }
         let of_triangle = unit_normal(corners).unwrap_or([0.0; 3]);
