@@ -391,7 +391,7 @@ impl LeafTriangles<'_> {
         }
         let mut least = f32::INFINITY;
         for lane in 0..LEAF_TRIANGLES {
-            if lanes >> lane & 1 != 0 && gaps[lane] < least {
+            if lanes >> lane & 1 != 0 && (gaps[lane] < least || gaps[lane].is_nan()) {
                 least = gaps[lane];
             }
         }
