@@ -7,7 +7,8 @@ use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
     Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves,
     Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interpolation, ManifoldPoint,
-    Method, Pair, Paths, Pose, Scan, Scratch, Semantics, Verdict,
+    Mesh, MeshBuildOptions, MeshScanPair, MeshScanPlan, Method, Pair, Paths, Pose, Scan, Scratch, Semantics,
+    Verdict,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -131,6 +132,33 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     assert_eq!(measure_all().to_bits(), first.to_bits(), "distances depend on the scratch");
     assert_eq!(ALLOCATOR.calls() - before, 0, "distances allocated");
     assert!(first > 100.0 * object.r, "some are apart: {first}");
+
+    let mesh = Mesh::build(object.mesh.as_ref().unwrap(), &MeshBuildOptions::default()).unwrap();
+    let distance = DistancePlan::against_mesh(&DistanceOptions::default(), &scan).unwrap();
+    let asked = [
+        options.with_evidence(Evidence::Certified),
+        options.with_semantics(Semantics::Thickened(0.5 * object.r)),
+        options.with_margin(object.r),
+    ];
+    let asked = asked.map(|options| MeshScanPlan::new(&options, &scan).unwrap());
+    let mut compare_all = || {
+        let (mut hits, mut sum) = (0, 0.0);
+        for (pose, work) in poses.iter().zip([u64::MAX, 400].into_iter().cycle()) {
+            let budget = Budget::UNLIMITED.with_work(work);
+            let pair = MeshScanPair::new(scan.at(&Pose::IDENTITY), mesh.at(pose)).within(&budget);
+            for plan in &asked {
+                hits += usize::from(pair.collide(plan, &mut scratch).verdict.is_intersecting());
+                pair.contacts(plan, &mut contacts, &mut scratch);
+            }
+            sum += pair.distance(&distance, &mut scratch).upper;
+        }
+        (hits, sum.to_bits())
+    };
+    let first = compare_all();
+    let before = ALLOCATOR.calls();
+    assert_eq!(compare_all(), first, "answers about a mesh depend on the scratch");
+    assert_eq!(ALLOCATOR.calls() - before, 0, "queries of a mesh and a scan allocated");
+    assert!(first.0 > 100, "{} contacts", first.0);
 
     let rng = &mut rng(5);
     let places: Vec<[f64; 3]> = (0..POSES)

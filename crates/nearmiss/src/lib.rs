@@ -41,9 +41,9 @@ pub use nearmiss_query::{
     Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve, CurveEnd,
     CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence,
     Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair, MeshQuality,
-    MeshScratch, MeshVerdict, Method, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedMesh,
-    PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
-    ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
+    MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method, NearestPoint, Order, Pacer, Pair, PairHint,
+    Placed, PlacedMesh, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch,
+    Semantics, Shape, ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

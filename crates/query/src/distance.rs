@@ -17,13 +17,12 @@ use crate::ask::answer::{Evidence, Statistics, Verdict};
 use crate::ask::budget::Budget;
 use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
 use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
-use crate::leaf::nearest_points::PointPair;
 use crate::pair::meter::Meter;
+use crate::pair::pairing::ItemPair;
 use crate::pair::placed::{Placed, ViewScratch};
 use crate::pair::scan_pair::{ScanPair, relative, relative_pose_of};
 use approach::{Approach, Feet};
-use search::Search;
-pub(crate) use search::{Frontier, Nearness};
+pub(crate) use search::{Frontier, Nearness, Search};
 
 /// Options of a distance query. Plain values; [`DistancePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,6 +96,19 @@ impl DistancePlan {
         let boundless = CollidePlan::new(&points, a, b)?;
         let options = DistanceOptions { metric: touching.options().metric, ..*options };
         Ok(Self { options, touching, boundless })
+    }
+
+    /// Validates `options` for a mesh and a scan in any poses. Serves two scans as well.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn against_mesh(options: &DistanceOptions, scan: &PointHierarchy) -> Result<Self, PlanError> {
+        Self::new(options, scan, scan)
+    }
+
+    /// The contact test.
+    pub(crate) fn touching(&self) -> &CollidePlan {
+        &self.touching
     }
 
     /// The options that were validated, with the metric of the scans.
@@ -177,7 +189,7 @@ const FAR_FEET: f64 = 6.0;
 struct Apart<'a> {
     plan: &'a DistancePlan,
     budget: &'a Budget,
-    search: Search<'a>,
+    search: Search<'a, ScanPair<'a>>,
 }
 
 impl Apart<'_> {
@@ -239,13 +251,13 @@ impl Apart<'_> {
 
     /// The greater local radius of the two nearest points, in the world.
     fn band(&self) -> f64 {
-        self.search.pair.band(self.search.best.points)
+        self.search.pair.band(self.search.best.items)
     }
 
     /// The nearest points of the balls about the two nearest samples, whose centres are `centres`.
     fn places_of_balls(&self, centres: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         let [p, q] = centres.map(Vector3::from);
-        let balls = self.search.pair.balls(self.search.best.points);
+        let balls = self.search.pair.balls(self.search.best.items);
         let (way, both) = (q - p, balls[0] + balls[1]);
         let length = way.norm();
         if both == 0.0 || length == 0.0 {
@@ -260,7 +272,7 @@ impl Apart<'_> {
     /// Returns `true` if both feet belong to their obstacles.
     fn are_obstacle(&self, feet: &Feet) -> bool {
         let views = self.search.pair.views;
-        (0..2).all(|k| views[k].is_obstacle(self.search.best.points[k], feet.points[k]))
+        (0..2).all(|k| views[k].is_obstacle(self.search.best.items[k], feet.points[k]))
     }
 
     /// Tests for contact. Returns the answer if the surfaces meet.
@@ -292,12 +304,12 @@ impl Apart<'_> {
             return None;
         }
         let meter = &mut self.search.pair.meter;
-        Approach { views: [a, b], samples: self.search.best.points, gathers, meter }.run()
+        Approach { views: [a, b], samples: self.search.best.items, gathers, meter }.run()
     }
 
     /// The answer that the nearest samples so far support.
     fn samples(&self) -> Distance {
-        let PointPair { distance, points } = self.search.best;
+        let ItemPair { distance, items: points } = self.search.best;
         let views = self.search.pair.views;
         let half = |k: usize| {
             0.5 * f64::from(views[k].scan().radii()[points[k]]) * views[k].stored_to_world().scale()

@@ -3,6 +3,7 @@
 pub(crate) mod bounds;
 pub(crate) mod likelihood;
 pub(crate) mod meter;
+pub(crate) mod pairing;
 pub(crate) mod placed;
 pub(crate) mod placed_balls;
 pub(crate) mod prepared;

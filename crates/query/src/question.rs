@@ -23,9 +23,9 @@ use crate::papers::PapersScratch;
 /// one.
 #[derive(Debug, Clone)]
 pub struct Scratch {
-    contact: ContactScratch,
+    pub(crate) contact: ContactScratch,
     papers: PapersScratch,
-    distance: crate::distance::Frontier,
+    pub(crate) distance: crate::distance::Frontier,
     curve: CurveScratch,
 }
 

@@ -13,6 +13,7 @@ mod eigen;
 mod evaluation;
 mod geodesics;
 mod hints;
+mod mesh_scans;
 mod meshes;
 mod reading;
 mod scans;
@@ -61,6 +62,8 @@ enum Command {
     Hints(hints::Arguments),
     /// Meshes: preparing, exact and time-critical collision, distance
     Meshes(meshes::Options),
+    /// An object's mesh against scans, beside its points
+    MeshScans(mesh_scans::Options),
     /// The speed of reading point files
     Reading(reading::Options),
     /// Decided and certified shares on real scans
@@ -90,6 +93,7 @@ fn main() -> Result<(), Failure> {
         Command::Geodesics(arguments) => geodesics::run(&arguments),
         Command::Hints(arguments) => hints::run(&arguments),
         Command::Meshes(options) => meshes::run(&options),
+        Command::MeshScans(options) => mesh_scans::run(&options),
         Command::Reading(options) => reading::run(&options),
         Command::Scans(options) => scans::run(&options),
         Command::Shapes(arguments) => shapes::run(&arguments),

@@ -4,7 +4,8 @@ use nearmiss_hierarchy::NodePair;
 use nearmiss_surface::Metric;
 
 use crate::ask::options::{CollidePlan, Semantics};
-use crate::leaf::nearest_points::{PointPair, nearest};
+use crate::leaf::nearest_points::nearest;
+use crate::pair::pairing::ItemPair;
 use crate::pair::scan_pair::ScanPair;
 
 /// Bounds of the distance of two leaves, in world units.
@@ -19,7 +20,7 @@ pub(crate) struct Least {
 
 impl Least {
     pub(crate) fn of(pair: &ScanPair<'_>, plan: &CollidePlan, leaves: NodePair) -> Self {
-        let none = PointPair { distance: f64::INFINITY, points: [0; 2] };
+        let none = ItemPair { distance: f64::INFINITY, items: [0; 2] };
         let points = nearest(pair.level, pair, leaves, none).distance;
         if let Semantics::Thickened(radius) = plan.options().semantics {
             let beyond = points - 2.0 * radius;

@@ -6,7 +6,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor};
 
 use crate::ask::answer::Contact;
-use crate::leaf::nearest_points::{PointPair, nearest};
+use crate::leaf::nearest_points::nearest;
+use crate::pair::pairing::ItemPair;
 use crate::pair::scan_pair::ScanPair;
 
 /// The search for two points within `reach` of each other.
@@ -32,8 +33,8 @@ impl<'a> Balls<'a> {
 
     /// Finds the nearest points of two leaves and records them if they are within reach.
     pub(crate) fn compare(&mut self, leaves: NodePair) -> ControlFlow<()> {
-        let best = PointPair { distance: self.apart, points: [0; 2] };
-        let PointPair { distance, points } = nearest(self.pair.level, &self.pair, leaves, best);
+        let best = ItemPair { distance: self.apart, items: [0; 2] };
+        let ItemPair { distance, items: points } = nearest(self.pair.level, &self.pair, leaves, best);
         if distance > self.reach {
             self.apart = distance;
             return ControlFlow::Continue(());
@@ -84,5 +85,5 @@ fn contact(pair: &ScanPair<'_>, [i, j]: [usize; 2]) -> Contact {
 
 /// Returns the contact of two points if they are within `reach` of each other in the world.
 pub(crate) fn balls_meet(pair: &ScanPair<'_>, reach: f64, points: [usize; 2]) -> Option<Contact> {
-    (PointPair::new(pair, points).distance <= reach).then(|| contact(pair, points))
+    (pair.point_pair(points).distance <= reach).then(|| contact(pair, points))
 }

@@ -15,8 +15,8 @@ use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{Frontier, Heap, NodePair, Open, PairVisitor, Stack, resume};
 
 use crate::pair::bounds::{BoundVisitor, Pairs};
+use crate::pair::pairing::Pairing;
 use crate::pair::relative_pose::{Gaps, LANES, Limits, RelativePose};
-use crate::pair::scan_pair::{ScanPair, balls_apart};
 
 /// A proof that two scans are separated: node pairs with disjoint enclosures that together cover
 /// the pair of the roots.
@@ -65,8 +65,8 @@ impl ProofScratch {
 
 /// Returns `true` if a proof would fail at these leaves: neither their enclosures nor their points
 /// are further apart than `reach`.
-pub(crate) fn are_doubtful(
-    pair: &ScanPair<'_>,
+pub(crate) fn are_doubtful<P: Pairing>(
+    pair: &P,
     relative_pose: &RelativePose,
     leaves: NodePair,
     reach: f32,
@@ -79,13 +79,13 @@ pub(crate) fn are_doubtful(
 }
 
 /// The gap of the enclosures of two nodes.
-fn gap_of_nodes(pair: &ScanPair<'_>, relative_pose: &RelativePose, nodes: NodePair) -> f32 {
-    relative_pose.gap(pair.bounds(relative_pose).of(pair.level, nodes).enclosures[0], pair.relative.slack())
+fn gap_of_nodes<P: Pairing>(pair: &P, relative_pose: &RelativePose, nodes: NodePair) -> f32 {
+    relative_pose.gap(pair.bounds(relative_pose).of(pair.level(), nodes).enclosures[0], pair.slack())
 }
 
 /// The search for a proof, or for two leaves at which it fails.
-pub(crate) struct Certifier<'c, 'a> {
-    pub(crate) pair: &'c mut ScanPair<'a>,
+pub(crate) struct Certifier<'c, P> {
+    pub(crate) pair: &'c mut P,
     /// Enclosures must be further apart than this, in a's stored frame.
     pub(crate) reach: f32,
     /// The proven pairs.
@@ -94,8 +94,8 @@ pub(crate) struct Certifier<'c, 'a> {
     pub(crate) doubtful: Option<NodePair>,
 }
 
-impl<'c, 'a> Certifier<'c, 'a> {
-    pub(crate) fn new(pair: &'c mut ScanPair<'a>, reach: f32, proven: &'c mut Vec<Bound>) -> Self {
+impl<'c, P: Pairing> Certifier<'c, P> {
+    pub(crate) fn new(pair: &'c mut P, reach: f32, proven: &'c mut Vec<Bound>) -> Self {
         proven.clear();
         Self { pair, reach, proven, doubtful: None }
     }
@@ -123,7 +123,7 @@ impl<'c, 'a> Certifier<'c, 'a> {
         scratch.clear();
         self.proven.clear();
         let ProofScratch { open, near, nearest, rest } = scratch;
-        let before = self.pair.meter.spent.node_pairs;
+        let before = self.pair.meter().spent.node_pairs;
         let gap = self.pair.gap_of_enclosures(NodePair::ROOTS);
         let mut proving =
             Proving::new(self.pair, relative_pose, self.reach, is_hinted || proof.is_some(), (near, rest));
@@ -135,13 +135,12 @@ impl<'c, 'a> Certifier<'c, 'a> {
         if !is_whole {
             return None;
         }
-        let compared = proving.pair.meter.spent.node_pairs - before;
+        let compared = proving.pair.meter().spent.node_pairs - before;
         let least = proving.tighten((compared / 8).max(32), nearest)?;
         let gap = if proving.is_cut { least.key.min(proving.enough) } else { least.key };
         let proven = self.in_world(gap);
         // For distant scans the bounding balls prove more than boxes.
-        let balls =
-            balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].stored_to_world().scale();
+        let balls = self.pair.balls_apart() / self.pair.to_world();
         #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
         let key = (balls * (1.0 - 1e-6)) as f32;
         let distance = self.in_world(key).max(proven);
@@ -183,16 +182,16 @@ impl<'c, 'a> Certifier<'c, 'a> {
 
     /// The distance in the world that a gap in a's stored frame proves.
     fn in_world(&self, gap: f32) -> f64 {
-        let slack = self.pair.relative.slack();
+        let slack = self.pair.slack();
         // Minus the rounding errors of the scale and the product.
-        f64::from(gap - slack) * self.pair.views[0].stored_to_world().scale() * (1.0 - 1e-9)
+        f64::from(gap - slack) * self.pair.to_world() * (1.0 - 1e-9)
     }
 }
 
 /// A proof in progress. Pairs that are not disjoint are split, the nearest child first, as the
 /// proof is likeliest to fail there.
-struct Proving<'p, 'a> {
-    pair: &'p mut ScanPair<'a>,
+struct Proving<'p, P> {
+    pair: &'p mut P,
     relative_pose: &'p RelativePose,
     /// Enclosures must be further apart than this, in a's stored frame.
     reach: f32,
@@ -212,9 +211,9 @@ struct Proving<'p, 'a> {
     doubtful: Option<NodePair>,
 }
 
-impl<'p, 'a> Proving<'p, 'a> {
+impl<'p, P: Pairing> Proving<'p, P> {
     fn new(
-        pair: &'p mut ScanPair<'a>,
+        pair: &'p mut P,
         relative_pose: &'p RelativePose,
         reach: f32,
         lists: bool,
@@ -228,7 +227,7 @@ impl<'p, 'a> Proving<'p, 'a> {
     /// Splits the open pairs until all are disjoint. Returns `false` if that fails at two leaves,
     /// or if the budget ends.
     fn run(&mut self, open: &mut Stack) -> bool {
-        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level);
+        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level());
         self.doubtful.is_none() && resume(&bounds, level, open, self).is_continue()
     }
 
@@ -236,9 +235,9 @@ impl<'p, 'a> Proving<'p, 'a> {
     /// consists of leaves or `most` more node pairs were compared. Returns the pair with the
     /// smallest gap, or the last pair that was split if only pairs with sufficient gaps remain.
     fn tighten(&mut self, most: u64, nearest: &mut Heap) -> Option<Open> {
-        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level);
+        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level());
         nearest.extend(self.near.drain(..));
-        let most = self.pair.meter.spent.node_pairs + most;
+        let most = self.pair.meter().spent.node_pairs + most;
         let mut tightening = Tightening { proving: self, most, last: None, is_over: false };
         let _ended = resume(&bounds, level, nearest, &mut tightening);
         let last = tightening.last.map(|last| Open { key: self.enough, ..last });
@@ -285,7 +284,7 @@ impl<'p, 'a> Proving<'p, 'a> {
         if own.key < self.enough {
             if KEPT * own.key < self.enough {
                 self.enough = KEPT * own.key;
-                self.beyond = self.relative_pose.beyond_gap(self.enough, self.pair.relative.slack());
+                self.beyond = self.relative_pose.beyond_gap(self.enough, self.pair.slack());
             }
             return true;
         }
@@ -297,8 +296,9 @@ impl<'p, 'a> Proving<'p, 'a> {
     }
 
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
-        self.pair.meter.spent.node_pairs += u64::from(pairs);
-        if self.doubtful.is_some() { ControlFlow::Break(()) } else { self.pair.meter.go_on() }
+        let meter = self.pair.meter();
+        meter.spent.node_pairs += u64::from(pairs);
+        if self.doubtful.is_some() { ControlFlow::Break(()) } else { self.pair.meter().go_on() }
     }
 
     /// Pairs with sufficient gaps can be skipped unless all are requested.
@@ -308,7 +308,7 @@ impl<'p, 'a> Proving<'p, 'a> {
     }
 }
 
-impl PairVisitor for Proving<'_, '_> {
+impl<P: Pairing> PairVisitor for Proving<'_, P> {
     #[inline]
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         Proving::compared(self, pairs)
@@ -322,7 +322,7 @@ impl PairVisitor for Proving<'_, '_> {
     }
 }
 
-impl BoundVisitor<f32> for Proving<'_, '_> {
+impl<P: Pairing> BoundVisitor<f32> for Proving<'_, P> {
     #[inline]
     fn limits(&self) -> Limits {
         Proving::limits(self)
@@ -336,15 +336,15 @@ impl BoundVisitor<f32> for Proving<'_, '_> {
 
     #[inline(always)]
     fn key(&mut self, _: &Open, pair: NodePair, boxes: f32, enclosures: f32) -> Option<f32> {
-        let gap = self.relative_pose.gap(enclosures, self.pair.relative.slack());
+        let gap = self.relative_pose.gap(enclosures, self.pair.slack());
         self.file(pair, boxes, gap)
     }
 }
 
 /// The improvement of a complete proof: the pairs with the smallest gaps are split to increase the
 /// gap. All pairs are disjoint, with their gaps as keys.
-struct Tightening<'t, 'p, 'a> {
-    proving: &'t mut Proving<'p, 'a>,
+struct Tightening<'t, 'p, P> {
+    proving: &'t mut Proving<'p, P>,
     /// The total count of compared node pairs at which to stop.
     most: u64,
     /// The pair that was split last.
@@ -352,11 +352,11 @@ struct Tightening<'t, 'p, 'a> {
     is_over: bool,
 }
 
-impl PairVisitor for Tightening<'_, '_, '_> {
+impl<P: Pairing> PairVisitor for Tightening<'_, '_, P> {
     #[inline]
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         let flow = self.proving.compared(pairs);
-        let is_over = self.is_over || self.proving.pair.meter.spent.node_pairs >= self.most;
+        let is_over = self.is_over || self.proving.pair.meter().spent.node_pairs >= self.most;
         if is_over { ControlFlow::Break(()) } else { flow }
     }
 
@@ -366,7 +366,7 @@ impl PairVisitor for Tightening<'_, '_, '_> {
     }
 }
 
-impl BoundVisitor<f32> for Tightening<'_, '_, '_> {
+impl<P: Pairing> BoundVisitor<f32> for Tightening<'_, '_, P> {
     #[inline]
     fn limits(&self) -> Limits {
         self.proving.limits()
@@ -376,7 +376,7 @@ impl BoundVisitor<f32> for Tightening<'_, '_, '_> {
     #[inline]
     fn may_split(&mut self, above: &Open, pairs: &Pairs, gaps: &Gaps) -> bool {
         let Proving { relative_pose, pair, .. } = &*self.proving;
-        let slack = pair.relative.slack();
+        let slack = pair.slack();
         let shows_less = |lane: usize| {
             gaps.near >> lane & 1 != 0 && relative_pose.gap(gaps.enclosures[lane], slack) <= above.key
         };
@@ -388,7 +388,7 @@ impl BoundVisitor<f32> for Tightening<'_, '_, '_> {
 
     #[inline]
     fn key(&mut self, _: &Open, pair: NodePair, _: f32, enclosures: f32) -> Option<f32> {
-        let gap = self.proving.relative_pose.gap(enclosures, self.proving.pair.relative.slack());
+        let gap = self.proving.relative_pose.gap(enclosures, self.proving.pair.slack());
         self.proving.is_near(&Open { pair, key: gap }).then_some(gap)
     }
 }

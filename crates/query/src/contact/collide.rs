@@ -50,11 +50,11 @@ pub(crate) struct ContactScratch {
     pub(crate) level: Level,
     pub(crate) longest_stretch: Duration,
     pub(crate) gathers: [ViewScratch; 2],
-    frontiers: Frontiers,
+    pub(crate) frontiers: Frontiers,
     excluded: Vec<Bound>,
-    compared: Vec<NodePair>,
-    proven: Vec<Bound>,
-    proof: ProofScratch,
+    pub(crate) compared: Vec<NodePair>,
+    pub(crate) proven: Vec<Bound>,
+    pub(crate) proof: ProofScratch,
     manifold: ManifoldScratch,
 }
 
@@ -84,13 +84,13 @@ pub(crate) struct Frontiers {
 }
 
 impl Frontiers {
-    fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.stack.clear();
         self.heap.clear();
     }
 
     /// The open pairs. A search that continues from a frontier is depth first, whatever its order.
-    fn open(&self) -> impl Iterator<Item = NodePair> {
+    pub(crate) fn open(&self) -> impl Iterator<Item = NodePair> {
         self.stack.iter().chain(self.heap.iter())
     }
 }
@@ -386,7 +386,7 @@ fn balls(
 
 /// The verdict for a separation by `distance` between surfaces or points, which is certified if
 /// `proven`.
-fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
+pub(crate) fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
     match options.semantics {
         Semantics::Thickened(radius) => {
             Verdict::Separated { gap: (distance - 2.0 * radius).max(0.0), evidence: Evidence::Certified }

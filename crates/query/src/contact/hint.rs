@@ -229,7 +229,7 @@ impl Known {
     pub(crate) fn prove_again(
         &mut self,
         pose: &Pose,
-        certifier: &mut Certifier<'_, '_>,
+        certifier: &mut Certifier<'_, ScanPair<'_>>,
         (expired, scratch): (&mut Vec<NodePair>, &mut ProofScratch),
     ) -> Option<f64> {
         let pair = &*certifier.pair;

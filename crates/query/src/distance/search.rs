@@ -8,10 +8,9 @@ use std::ops::ControlFlow;
 use nearmiss_hierarchy::{self as hierarchy, NodePair, PairVisitor, Part, resume};
 use nearmiss_lanes::order::{ascending, from_ascending};
 
-use crate::leaf::nearest_points::{PointPair, nearest};
 use crate::pair::bounds::BoundVisitor;
+use crate::pair::pairing::{ItemPair, Pairing};
 use crate::pair::relative_pose::{Limits, RelativePose};
-use crate::pair::scan_pair::ScanPair;
 
 type Open = hierarchy::Open<Nearness>;
 
@@ -108,13 +107,13 @@ impl hierarchy::Frontier<Nearness> for Frontier {
     }
 }
 
-/// A search for the nearest points of two scans.
+/// A search for the nearest items of two things: points, or triangles.
 #[derive(Debug)]
-pub(crate) struct Search<'a> {
-    pub(crate) pair: ScanPair<'a>,
-    relative_pose: &'a RelativePose,
-    /// The nearest points so far.
-    pub(crate) best: PointPair,
+pub(crate) struct Search<'m, P> {
+    pub(crate) pair: P,
+    relative_pose: &'m RelativePose,
+    /// The nearest items so far.
+    pub(crate) best: ItemPair,
     /// `true` if the enclosures are compared, too.
     pub(crate) of_enclosures: bool,
     /// Pairs whose boxes exceed the distance of the scans' centres by this much cannot improve the
@@ -131,12 +130,12 @@ pub(crate) struct Search<'a> {
     pub(crate) stops_at_zero: bool,
 }
 
-impl<'a> Search<'a> {
+impl<'m, P: Pairing> Search<'m, P> {
     /// A search that starts from an arbitrary point pair, for the nearest points and, if
     /// `of_enclosures`, the nearest enclosures of leaves.
-    pub(crate) fn new(pair: ScanPair<'a>, relative_pose: &'a RelativePose, of_enclosures: bool) -> Self {
+    pub(crate) fn new(pair: P, relative_pose: &'m RelativePose, of_enclosures: bool) -> Self {
         let enclosures = if of_enclosures { f32::INFINITY } else { f32::NEG_INFINITY };
-        let best = PointPair::new(&pair, [0, 0]);
+        let best = pair.items([0, 0]);
         let points = relative_pose.beyond(relative_pose.bound_of(best.distance));
         let (share, near_enough, stops_at_zero) = (None, f64::NEG_INFINITY, false);
         Self {
@@ -155,13 +154,13 @@ impl<'a> Search<'a> {
     /// Searches from the roots down. Breaks if the search was ended early.
     pub(crate) fn run(&mut self, open: &mut Frontier) -> ControlFlow<()> {
         open.start(Nearness::new(self.relative_pose.least(), self.relative_pose.least()));
-        self.pair.meter.go_on()?;
+        self.pair.meter().go_on()?;
         self.go_on(open)
     }
 
     /// Searches the open pairs.
     pub(crate) fn go_on(&mut self, open: &mut Frontier) -> ControlFlow<()> {
-        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level);
+        let (bounds, level) = (self.pair.bounds(self.relative_pose), self.pair.level());
         resume(&bounds, level, open, self)
     }
 
@@ -182,9 +181,9 @@ impl<'a> Search<'a> {
     }
 
     /// Compares the points of two leaves and updates the limits.
-    fn compare(&mut self, leaves: NodePair, [a, b]: [usize; 2]) {
-        self.pair.meter.leaf_pair(self.pair.a.leaves.points(a).len(), self.pair.b.leaves.points(b).len());
-        self.best = nearest(self.pair.level, &self.pair, leaves, self.best);
+    fn compare(&mut self, leaves: NodePair, numbers: [usize; 2]) {
+        self.pair.count_leaves(numbers);
+        self.best = self.pair.nearest(leaves, self.best);
         let upper = self.best.distance.max(0.0);
         self.points = self.relative_pose.beyond(self.relative_pose.bound_of(upper));
         if self.of_enclosures
@@ -198,7 +197,7 @@ impl<'a> Search<'a> {
     /// The greater bound of two leaves, by enclosures or by points, relative to the distance of the
     /// scans' centres. Returns a smaller bound early if that suffices.
     fn bound_of_leaves(&self, leaves: NodePair, by_enclosures: f32) -> f32 {
-        if self.pair.part == Part::Surface {
+        if self.pair.part() == Part::Surface {
             return by_enclosures;
         }
         // Comparing the points of each leaf with the box of the other is much faster than comparing
@@ -211,11 +210,12 @@ impl<'a> Search<'a> {
     }
 }
 
-impl PairVisitor<Nearness> for Search<'_> {
+impl<P: Pairing> PairVisitor<Nearness> for Search<'_, P> {
     #[inline]
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
-        self.pair.meter.spent.node_pairs += u64::from(pairs);
-        self.pair.meter.go_on()
+        let meter = self.pair.meter();
+        meter.spent.node_pairs += u64::from(pairs);
+        meter.go_on()
     }
 
     #[inline]
@@ -234,11 +234,11 @@ impl PairVisitor<Nearness> for Search<'_> {
         if self.best.distance <= self.near_enough || self.stops_at_zero && self.may_touch() {
             return ControlFlow::Break(());
         }
-        self.pair.meter.go_on()
+        self.pair.meter().go_on()
     }
 }
 
-impl BoundVisitor<Nearness> for Search<'_> {
+impl<P: Pairing> BoundVisitor<Nearness> for Search<'_, P> {
     #[inline]
     fn limits(&self) -> Limits {
         Limits { boxes: self.points, enclosures: self.enclosures }
@@ -254,7 +254,7 @@ impl BoundVisitor<Nearness> for Search<'_> {
         if is_leaf_a != is_leaf_b {
             // The points of a loose leaf give a better bound than its box, for the nearest points
             // as well.
-            if self.pair.part == Part::Obstacle
+            if self.pair.part() == Part::Obstacle
                 && let Some(gap) = self.pair.gap_by_points(pair)
             {
                 enclosures = enclosures.max(self.relative_pose.no_nearer(f64::from(gap)));

@@ -9,23 +9,17 @@ use nearmiss_hierarchy::{NodePair, Part};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::wide::{bits, blocks_of, lanes_of, load, squared};
 
+use crate::pair::pairing::ItemPair;
 use crate::pair::scan_pair::ScanPair;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Two points and their distance in the world, for obstacles minus the radii of their balls.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PointPair {
-    pub(crate) distance: f64,
-    /// Stored points of a and b.
-    pub(crate) points: [usize; 2],
-}
-
-impl PointPair {
-    pub(crate) fn new(pair: &ScanPair<'_>, points: [usize; 2]) -> Self {
-        let [p, q] = [0, 1].map(|k| Vector3::from(pair.views[k].point(points[k])));
-        let balls = if pair.is_of_balls(points) { pair.balls(points).iter().sum() } else { 0.0 };
-        Self { distance: (p - q).norm() - balls, points }
+impl ScanPair<'_> {
+    /// Two points and their distance in the world, for obstacles minus the radii of their balls.
+    pub(crate) fn point_pair(&self, points: [usize; 2]) -> ItemPair {
+        let [p, q] = [0, 1].map(|k| Vector3::from(self.views[k].point(points[k])));
+        let balls = if self.is_of_balls(points) { self.balls(points).iter().sum() } else { 0.0 };
+        ItemPair { distance: (p - q).norm() - balls, items: points }
     }
 }
 
@@ -36,7 +30,7 @@ fn has_balls(pair: &ScanPair<'_>, [a, b]: [usize; 2]) -> bool {
 }
 
 /// The nearest of `best` and all point pairs of two leaves; among equals the first found.
-pub(crate) fn nearest(level: Level, pair: &ScanPair<'_>, leaves: NodePair, best: PointPair) -> PointPair {
+pub(crate) fn nearest(level: Level, pair: &ScanPair<'_>, leaves: NodePair, best: ItemPair) -> ItemPair {
     dispatch!(level, simd => simd.vectorize(
         #[inline(always)]
         || nearest_by(simd, pair, leaves, best),
@@ -44,7 +38,7 @@ pub(crate) fn nearest(level: Level, pair: &ScanPair<'_>, leaves: NodePair, best:
 }
 
 #[inline(always)]
-fn nearest_by<S: Simd>(simd: S, pair: &ScanPair<'_>, leaves: NodePair, mut best: PointPair) -> PointPair {
+fn nearest_by<S: Simd>(simd: S, pair: &ScanPair<'_>, leaves: NodePair, mut best: ItemPair) -> ItemPair {
     let [leaf_a, leaf_b] = pair.numbers(leaves);
     let (points_a, points_b) = (pair.a.leaves.points(leaf_a), pair.b.leaves.points(leaf_b));
     let bounds = &pair.b.tree.bounds(leaves.b);
@@ -99,7 +93,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &ScanPair<'_>, leaves: NodePair, mut best:
                     let other = least(&d_sq.to_array(), left_b);
                     left_b &= !(1 << other);
                     let points = [block_a * WIDTH + lane, block_b * WIDTH + other];
-                    let own = PointPair::new(pair, points);
+                    let own = pair.point_pair(points);
                     if own.distance < best.distance {
                         best = own;
                         reach = reach_of(pair, best.distance);

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{NodePair, OrientedBox, Part, Relative, ScanArrays};
 use nearmiss_lanes::wide::{blocks_of, lanes_of, load};
@@ -87,6 +87,27 @@ impl<S: Simd> Balls<S> {
         let there = mask32x16::from_bitmask(simd, u64::from(self.lanes));
         there.select(of, f32x16::splat(simd, f32::INFINITY)).reduce_min()
     }
+}
+
+/// A lower bound on the distance of a leaf's part of the obstacle from a box in the scan's stored
+/// frame, from the points of the leaf.
+pub(crate) fn gap_of_leaf_and_box(
+    level: Level,
+    scan: &ScanArrays<'_>,
+    leaf: NodeId,
+    bounds: &OrientedBox,
+) -> f32 {
+    let points = &scan.tree.topology().points(leaf);
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut least = f32::INFINITY;
+            for block in blocks_of(points) {
+                least = least.min(Balls::of(simd, scan, points, block).gap_to_box(simd, bounds));
+            }
+            least
+        },
+    ))
 }
 
 impl ScanPair<'_> {

@@ -15,7 +15,7 @@
 //! validation over the scans, the fit beats every constant.
 
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{NodePair, OrientedBox, ScanArrays};
+use nearmiss_hierarchy::{MeshView, NodePair, OrientedBox, Relative, ScanArrays};
 
 use crate::pair::scan_pair::ScanPair;
 
@@ -62,12 +62,31 @@ impl Content {
     }
 }
 
+impl Content {
+    /// The content of a node of a mesh, with lengths multiplied by `scale`. The area of the triangles
+    /// is estimated by half the surface of the box: exact for a flat patch, and half as much as a
+    /// cube has.
+    fn of_mesh(mesh: &MeshView<'_>, id: NodeId, scale: f64) -> Self {
+        let half = mesh.tree.bounds(id).half.map(|edge| f64::from(edge) * scale);
+        Self {
+            size: half.iter().sum(),
+            volume: 8.0 * half.iter().product::<f64>(),
+            area: 4.0 * (half[0] * half[1] + half[1] * half[2] + half[2] * half[0]),
+        }
+    }
+}
+
 impl Hint {
     fn of(pair: &ScanPair<'_>, reach: f32, nodes: NodePair) -> Self {
         let (bounds_a, bounds_b) = (pair.a.tree.bounds(nodes.a), pair.b.tree.bounds(nodes.b));
         let share = pair.relative.overlap(&bounds_a, &bounds_b, reach);
         let a = Content::of(pair.a, nodes.a, 1.0);
         let b = Content::of(pair.b, nodes.b, f64::from(pair.relative.scale()));
+        Self::of_contents(share, a, b)
+    }
+
+    /// The evidence of boxes with this overlap and these contents.
+    fn of_contents(share: f32, a: Content, b: Content) -> Self {
         let ratio = (a.size / b.size).ln().abs();
         let (small, large) = if a.volume < b.volume { (a, b) } else { (b, a) };
         // Boxes that overflow or have no extent carry no information.
@@ -81,11 +100,29 @@ impl Hint {
 /// Estimates the probability that the open pairs contain a contact, or points within `reach`. If no
 /// pair is open, estimates it for the pair of the roots.
 pub(crate) fn likelihood(pair: &ScanPair<'_>, reach: f32, open: impl Iterator<Item = NodePair>) -> f64 {
+    likelihood_by(open, |nodes| Hint::of(pair, reach, nodes))
+}
+
+/// The same for a scan and a mesh, with the coefficients that were fitted to scans.
+pub(crate) fn likelihood_of_mesh(
+    (a, b): (&ScanArrays<'_>, &MeshView<'_>),
+    relative: &Relative,
+    reach: f32,
+    open: impl Iterator<Item = NodePair>,
+) -> f64 {
+    likelihood_by(open, |nodes| {
+        let share = relative.overlap(&a.tree.bounds(nodes.a), &b.tree.bounds(nodes.b), reach);
+        let of_mesh = Content::of_mesh(b, nodes.b, f64::from(relative.scale()));
+        Hint::of_contents(share, Content::of(a, nodes.a, 1.0), of_mesh)
+    })
+}
+
+fn likelihood_by(open: impl Iterator<Item = NodePair>, hint: impl Fn(NodePair) -> Hint) -> f64 {
     let mut open = open.take(LOOKED_AT).peekable();
     let roots = open.peek().is_none().then_some(NodePair::ROOTS);
     let (mut best, mut sheets) = (Hint { share: 0.0, sheets: 0.0, ratio: 0.0 }, 0.0);
     for nodes in open.chain(roots) {
-        let hint = Hint::of(pair, reach, nodes);
+        let hint = hint(nodes);
         sheets += hint.sheets;
         if hint.share > best.share {
             best = hint;

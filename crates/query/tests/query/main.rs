@@ -14,6 +14,7 @@ mod interpolation;
 mod interpolation_leaves;
 mod manifold;
 mod margin;
+mod mesh_scans;
 mod meshes;
 mod orders;
 mod outputs;

@@ -1,0 +1,60 @@
+//! Validated options for a mesh and a scan.
+
+use nearmiss_hierarchy::PointHierarchy;
+
+use crate::ask::options::{CollideOptions, CollidePlan, Method, Order, PlanError, Semantics};
+use crate::distance::DistancePlan;
+
+/// A validated question about a mesh and a scan. It serves every mesh, and every scan of the same
+/// [metric](PointHierarchy::metric), in any poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshScanPlan {
+    options: CollideOptions,
+}
+
+impl MeshScanPlan {
+    /// Validates `options`.
+    ///
+    /// The options have the meaning that they have for two scans ([`CollideOptions`]), with one
+    /// difference: with [`Semantics::Thickened`] only the points of the scan have balls, as the mesh
+    /// is exact.
+    ///
+    /// # Errors
+    /// Names the option that is out of range, or the metric that does not match. The methods and
+    /// orders of the papers, and sphere coverings, are for two scans: any of them is
+    /// [`PlanError::NotForMeshes`].
+    pub fn new(options: &CollideOptions, scan: &PointHierarchy) -> Result<Self, PlanError> {
+        let refused = match (options.method, options.order) {
+            (Method::Sampling(_), _) => Some("the method `sampling`"),
+            (Method::Interpolation(_), _) => Some("the method `interpolation`"),
+            (Method::Traversal, Some(Order::Sides)) => Some("the order `sides`"),
+            (Method::Traversal, Some(Order::SidesByGap)) => Some("the order `sides-by-gap`"),
+            _ => options.coverings.then_some("sphere coverings"),
+        };
+        if let Some(what) = refused {
+            return Err(PlanError::NotForMeshes(what));
+        }
+        Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
+    }
+
+    /// The contact test of a distance query.
+    pub(crate) fn touching(plan: &DistancePlan) -> Self {
+        Self { options: *plan.touching().options() }
+    }
+
+    /// Returns the distance, in world units, up to which a triangle and a point or a surface count
+    /// as meeting.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        match self.options.semantics {
+            Semantics::Thickened(radius) => radius + self.options.margin,
+            Semantics::Obstacle | Semantics::Surface => self.options.margin,
+        }
+    }
+
+    /// The options that were validated, with the metric of the scan.
+    #[must_use]
+    pub fn options(&self) -> &CollideOptions {
+        &self.options
+    }
+}
