@@ -163,6 +163,35 @@ impl Forecast<'_> {
     }
 }
 
+/// The cost of preparing a triangle. Measured with getrusage.
+const TRIANGLE: Cost = Cost { bytes: 600.0, micros: 2.0 };
+
+/// Fails if a file with about `points` vertices and `bytes` bytes cannot be read in memory.
+pub(crate) fn check_reading_mesh(path: &Path, limit: Limit, points: u64, bytes: u64) -> Result<(), CliError> {
+    let what = format!("reading {} vertices needs", grouped(points));
+    refuse(path, limit, &what, reading(points, bytes), &[])
+}
+
+/// Fails if the triangles of `mesh` cannot be prepared in memory, and announces long runs.
+pub(crate) fn check_mesh(
+    path: &Path,
+    (limit, threads): (Limit, usize),
+    console: Console,
+    mesh: &TriangleMesh,
+) -> Result<(), CliError> {
+    let triangles = to_float(mesh.triangles().len() as u64);
+    let shown = grouped(mesh.triangles().len() as u64);
+    let need = BASE + TRIANGLE.bytes * triangles;
+    let remedy = "use fewer triangles".to_owned();
+    refuse(path, limit, &format!("{shown} triangles need"), need, &[remedy])?;
+    let seconds = seconds(TRIANGLE.micros * triangles, threads);
+    if seconds > LONG {
+        let (time, size) = (duration(seconds), size(need));
+        console.note(format_args!("preparing {shown} triangles takes about {time} and {size}"));
+    }
+    Ok(())
+}
+
 /// The cost of a sample. Measured: 24.2 bytes at 3,453,074 and at 11,932,842 samples of an atrium.
 /// The file is written while samples are made.
 const SAMPLE: Cost = Cost { bytes: 24.5, micros: 0.12 };

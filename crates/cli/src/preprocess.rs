@@ -1,6 +1,7 @@
 //! `preprocess`: prepares a scan and saves it.
 
 mod args;
+mod as_mesh;
 mod on_disk;
 mod outcome;
 
@@ -23,6 +24,9 @@ pub(crate) use args::{parse_format, parse_threads};
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;
     let console = Console::new(args.quiet);
+    if args.as_mesh {
+        return as_mesh::run(args, console);
+    }
     let name = args.input.display();
 
     let forecast = forecast(args, console);

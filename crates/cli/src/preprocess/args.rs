@@ -10,6 +10,7 @@ use crate::eval::KernelName;
 use crate::filters::FilterArgs;
 use crate::input::pieces;
 use crate::memory::MemoryArgs;
+use crate::parse::parse_length;
 
 /// Options of `preprocess`.
 #[derive(Debug, Clone, Args)]
@@ -19,7 +20,7 @@ pub struct PreprocessArgs {
     ///
     /// The points of a mesh are its vertices; `nearmiss sample` puts points on its faces.
     pub input: PathBuf,
-    /// Prepared scan to write, usually named .nm; an existing file is replaced in one step
+    /// Prepared scan or mesh to write, usually named .nm; an existing file is replaced in one step
     #[arg(short, long, value_name = "OUT.nm")]
     pub output: PathBuf,
     /// Format of the input; auto decides by content, then by name
@@ -27,6 +28,15 @@ pub struct PreprocessArgs {
     /// Known formats: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf.
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
+    /// Prepare the triangles of a mesh, for `mesh-collide` and `--as-mesh` of other commands
+    ///
+    /// Triangles without area and repeated triangles are dropped. By default, only the vertices of
+    /// a mesh are prepared, as points.
+    #[arg(long, conflicts_with_all = OF_SCANS)]
+    pub as_mesh: bool,
+    /// Weld vertices over this distance, with --as-mesh; by default, only equal ones are welded
+    #[arg(long, value_name = "LEN", requires = "as_mesh", allow_hyphen_values = true, value_parser = parse_length)]
+    pub weld: Option<f64>,
     /// The filters
     #[command(flatten)]
     pub filters: FilterArgs,
@@ -92,6 +102,26 @@ pub struct PreprocessArgs {
     #[arg(long, help_heading = "Output")]
     pub quiet: bool,
 }
+
+/// The options that apply to scans and not to meshes.
+const OF_SCANS: [&str; 16] = [
+    "crop",
+    "class",
+    "voxel",
+    "remove_outliers",
+    "min_neighbours",
+    "radius_neighbours",
+    "reach",
+    "weight",
+    "bandwidth",
+    "leaf",
+    "graph",
+    "neighbours",
+    "close_pairs",
+    "paths",
+    "kernel",
+    "scanner",
+];
 
 /// A format, or `None` to detect it from content and name.
 #[derive(Debug, Clone, Copy)]

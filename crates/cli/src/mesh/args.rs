@@ -1,0 +1,55 @@
+//! The options of `mesh-collide`.
+
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::contacts::ContactArgs;
+use crate::parse::parse_duration;
+use crate::path::PathArgs;
+use crate::posing::PairArgs;
+use crate::preprocess::parse_threads;
+
+/// Options of `mesh-collide`.
+#[derive(Debug, Clone, Args)]
+pub struct MeshCollideArgs {
+    /// The meshes and their poses
+    #[command(flatten)]
+    pub pair: PairArgs,
+    /// The options for many poses
+    #[command(flatten)]
+    pub path: PathArgs,
+    /// Stop at the first contact of --poses
+    #[arg(long, requires = "poses")]
+    pub first: bool,
+    /// Find all contacts, not one
+    ///
+    /// One contact is reported for each pair of triangles that meet.
+    #[arg(long)]
+    pub all: bool,
+    /// The treatment of the contacts
+    #[command(flatten)]
+    pub contacts: ContactArgs,
+    /// Time limit for each query, such as 200us
+    ///
+    /// The unit is ns, us, ms or s. When time runs out, the answer is undecided.
+    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
+    pub budget: Option<Duration>,
+    /// Work limit for each query; reproducible, unlike time
+    ///
+    /// A unit is one node pair; two leaves count as 16.
+    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    pub work: Option<u64>,
+    /// Threads; 0 for all cores
+    ///
+    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The
+    /// answers do not depend on it.
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
+    pub threads: Option<usize>,
+    /// Print one JSON object for each query
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
+    pub quiet: bool,
+}
