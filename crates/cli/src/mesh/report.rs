@@ -55,7 +55,7 @@ impl MeshReport {
         let unit = 1e-5 * diagonal(mesh.bounds());
         let [min, max] = self.bounds.map(|p| place(p, unit));
         let DroppedReport { degenerate, duplicate } = self.dropped;
-        let dropped = counts([(degenerate.into(), "degenerate"), (duplicate.into(), "duplicate triangle")]);
+        let dropped = counts([(degenerate.into(), "degenerate triangle"), (duplicate.into(), "duplicate")]);
         let dropped = if dropped.is_empty() { dropped } else { format!(" ({dropped} dropped)") };
         let welded = self.welded_vertices;
         let welded = if welded == 0 { String::new() } else { format!(" ({welded} welded to others)") };

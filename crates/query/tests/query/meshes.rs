@@ -153,8 +153,7 @@ fn meshes_that_touch_answer_as_all_pairs_of_triangles_do() {
         let shift = [whole(rng, 2), whole(rng, 2), whole(rng, 1)];
         // Also upside down and by right angles, exactly.
         let turn = [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-        let turned = Pose::from_quaternion(turn[rng.random_range(0..5_usize).saturating_sub(2)])
-            .with_translation(shift);
+        let turned = Pose::from_quaternion(turn[rng.random_range(0..5_usize).saturating_sub(2)]).with_translation(shift);
         hits += u32::from(check(&meshes, &[Pose::IDENTITY, turned]));
     }
     assert!((40..110).contains(&hits), "{hits} hits");
