@@ -37,7 +37,7 @@ pub struct MeshCollideArgs {
     pub budget: Option<Duration>,
     /// Work limit for each query; reproducible, unlike time
     ///
-    /// A unit is one node pair; two leaves count as 16.
+    /// A unit is one node pair; 500 to 10000 is common.
     #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
     pub work: Option<u64>,
     /// Threads; 0 for all cores

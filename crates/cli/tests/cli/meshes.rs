@@ -257,7 +257,7 @@ fn all_contacts_of_meshes_form_closed_curves() {
     let people = place.ok(&asked).results;
     assert!(people.contains(&format!("{} contacts in 1 clash ", contacts.len())), "{people}");
     assert!(people.lines().filter(|line| line.contains("between triangle")).count() == contacts.len() + 1);
-    let few = place.ok(&[&asked[..], &["--json", "--work", "20"]].concat()).json().remove(0);
+    let few = place.ok(&[&asked[..], &["--json", "--work", "4"]].concat()).json().remove(0);
     assert_eq!(few["complete"], false, "{few}");
 }
 
