@@ -1,5 +1,5 @@
-//! Bytes opened as a prepared mesh, with corrected checksums, and asked everything. The first byte selects the
-//! check, and whether the header is to state the length that the file has.
+//! Bytes opened as a prepared mesh, with corrected checksums, and asked everything. The first byte
+//! selects the check, and whether the header is to state the length that the file has.
 #![no_main]
 
 #[path = "../../crates/nearmiss/tests/facade/hostile"]

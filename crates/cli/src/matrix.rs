@@ -16,7 +16,7 @@ pub struct PoseRefused {
     pub cause: PoseError,
     /// `true` if the transpose has the form of a pose.
     pub is_transposed: bool,
-    /// How far making a matrix a pose may move the object's bounds, in words.
+    /// The length by which making a matrix a pose may move the object's bounds, in words.
     pub allowed: &'static str,
 }
 

@@ -94,8 +94,8 @@ pub(crate) trait Posable {
     /// Returns the bounds in the frame of the input.
     fn bounds(&self) -> &Aabb;
 
-    /// Returns how far making a matrix a pose may move the bounds, in the units of the object, and
-    /// that length in words.
+    /// Returns the length by which making a matrix a pose may move the bounds, in the units of the
+    /// object, and that length in words.
     fn tolerance(&self) -> (f64, &'static str);
 }
 

@@ -18,8 +18,9 @@ use crate::report::ScanReport;
 use args::{graph_options, options};
 use outcome::{Seconds, save, tell};
 
+pub(crate) use crate::parse::parse_threads;
+pub(crate) use args::parse_format;
 pub use args::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, WeightName};
-pub(crate) use args::{parse_format, parse_threads};
 
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;

@@ -5,10 +5,9 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::contacts::ContactArgs;
-use crate::parse::parse_duration;
+use crate::parse::{parse_duration, parse_threads};
 use crate::path::PathArgs;
 use crate::posing::PairArgs;
-use crate::preprocess::parse_threads;
 
 /// Options of `mesh-collide`.
 #[derive(Debug, Clone, Args)]

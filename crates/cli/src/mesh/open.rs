@@ -10,7 +10,8 @@ use crate::input::{self, Opening};
 use crate::posing::Posable;
 use crate::units::diagonal;
 
-/// How far making a matrix a pose may move the bounds of a mesh, as a share of their diagonal.
+/// The length by which making a matrix a pose may move the bounds of a mesh, as a share of their
+/// diagonal.
 const TOLERANCE: f64 = 1e-4;
 
 impl Posable for Mesh {

@@ -10,7 +10,7 @@ use crate::eval::KernelName;
 use crate::filters::FilterArgs;
 use crate::input::pieces;
 use crate::memory::MemoryArgs;
-use crate::parse::parse_length;
+use crate::parse::{parse_length, parse_threads};
 
 /// Options of `preprocess`.
 #[derive(Debug, Clone, Args)]
@@ -184,16 +184,6 @@ fn parse_bandwidth(text: &str) -> Result<Bandwidth, String> {
 fn parse_reach(text: &str) -> Result<f64, String> {
     let reach = text.parse().ok().filter(|reach: &f64| *reach > 0.0 && reach.is_finite());
     reach.ok_or_else(|| "expected a length of more than zero, in the units of the input".into())
-}
-
-/// The largest number of threads; more do not help, and may not start.
-const MOST_THREADS: usize = 1024;
-
-pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(n) if n <= MOST_THREADS => Ok(n),
-        _ => Err(format!("expected a number from 0 (all cores) to {MOST_THREADS}")),
-    }
 }
 
 impl PreprocessArgs {

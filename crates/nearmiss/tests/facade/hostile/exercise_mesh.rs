@@ -39,8 +39,8 @@ fn poses(size: f64) -> [Pose; 4] {
 /// Runs all queries on `mesh`, with `other` as the second mesh.
 ///
 /// # Panics
-/// Panics if a hint changes a verdict about a valid mesh, if a query costs more than comparing all pairs of nodes several times, if a small budget is
-/// exceeded, or if the mesh cannot be written.
+/// Panics if a hint changes a verdict about a valid mesh, if a query costs more than comparing all
+/// pairs of nodes several times, if a small budget is exceeded, or if the mesh cannot be written.
 #[must_use]
 pub(crate) fn exercise_mesh(mesh: &Mesh, other: &Mesh) -> MeshAnswers {
     let is_sound = mesh.check_contents().is_ok();
