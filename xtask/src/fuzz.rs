@@ -9,14 +9,28 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use nearmiss::slices::{Pixel, SliceBuilder, SliceOptions, SlicePlan, SliceTarget};
-use nearmiss::{Aabb, BuildOptions, PointCloud, Scan};
+use nearmiss::{Aabb, BuildOptions, Mesh, MeshBuildOptions, PointCloud, Scan, TriangleMesh};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::files;
 
 use crate::repository::{Outcome, cargo, root, run as run_command};
 
-const TARGETS: [&str; 13] =
-    ["container", "slices", "lines", "ply", "pcd", "obj", "xyz", "las", "e57", "npy", "stl", "off", "gltf"];
+const TARGETS: [&str; 14] = [
+    "container",
+    "mesh",
+    "slices",
+    "lines",
+    "ply",
+    "pcd",
+    "obj",
+    "xyz",
+    "las",
+    "e57",
+    "npy",
+    "stl",
+    "off",
+    "gltf",
+];
 
 /// Flags that count edges inline, and pass the operands of comparisons to the fuzzer.
 const FLAGS: &str = "--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
@@ -79,6 +93,7 @@ fn host() -> Outcome<String> {
 fn seeds(target: &str) -> Outcome<Vec<Vec<u8>>> {
     let endings: &[&str] = match target {
         "container" => return containers(),
+        "mesh" => return meshes(),
         "slices" => return slices(),
         "lines" => return Ok(LINES.iter().map(|line| line.as_bytes().to_vec()).collect()),
         "xyz" => &["xyz", "csv"],
@@ -135,6 +150,23 @@ fn containers() -> Outcome<Vec<Vec<u8>>> {
     Ok(seeds)
 }
 
+/// Returns prepared meshes, each after a byte that selects the check.
+fn meshes() -> Outcome<Vec<Vec<u8>>> {
+    let mut seeds = Vec::new();
+    for (triangles, scale) in [(1, 1.0), (5, 1e-6), (40, 1.0)] {
+        let corners = arbitrary::cloud(CloudKind::Random, 3 * triangles, 3);
+        let corners = corners.into_iter().map(|p| p.map(|x| x * scale)).collect();
+        let triangles = (0..triangles).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mesh = Mesh::build(&TriangleMesh::new(corners, triangles)?, &MeshBuildOptions::default())?;
+        for how in 0..4 {
+            let mut seed = vec![how];
+            mesh.write_to(&mut seed)?;
+            seeds.push(seed);
+        }
+    }
+    Ok(seeds)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,6 +188,9 @@ mod tests {
         }
         for seed in containers().unwrap() {
             assert!(Scan::from_bytes(seed[1..].to_vec(), nearmiss::Check::Full).is_ok());
+        }
+        for seed in meshes().unwrap() {
+            assert!(Mesh::from_bytes(seed[1..].to_vec(), nearmiss::Check::Full).is_ok());
         }
     }
 }

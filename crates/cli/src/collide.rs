@@ -1,17 +1,16 @@
 //! `collide`: tests whether two scans touch, and where.
 
 use std::io::Write;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Contacts, Deadline, Detail, Distance,
-    DistanceOptions, DistancePlan, Evidence, ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch,
-    Verdict, each,
+    Answer, Budget, CollideOptions, CollidePlan, Contacts, Deadline, Detail, Distance, DistanceOptions,
+    DistancePlan, Evidence, ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch, Verdict,
 };
 
+use crate::as_mesh::{AsMeshName, OF_COLLIDE};
 use crate::console::{self, Console, Results, now};
 use crate::contacts::ContactArgs;
 use crate::distance::beside;
@@ -19,18 +18,19 @@ use crate::distance_picture::paint_apart;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
+use crate::mesh::args::MeshCollideArgs;
 use crate::parse::{parse_duration, parse_radius};
 use crate::path::{PathArgs, PathLog};
 use crate::path_entry::{PathEntry, PathVerdict};
+use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::search::SearchArgs;
 use crate::sentence::{hint, sentence, unit};
-use crate::threads::pool;
 use crate::units::SizeCheck;
 use crate::viewpoint::ViewArgs;
-use crate::{output, picture, proof};
+use crate::{mesh, output, picture, proof};
 
 /// Options of `collide`.
 #[derive(Debug, Clone, Args)]
@@ -53,6 +53,9 @@ pub struct CollideArgs {
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
+    /// Compare the triangles of meshes instead of points; `both` does what `mesh-collide` does
+    #[arg(long, value_enum, value_name = "WHICH", conflicts_with_all = OF_COLLIDE)]
+    pub as_mesh: Option<AsMeshName>,
     /// Report scans that come nearer than this as touching, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub margin: f64,
@@ -299,6 +302,10 @@ struct Outputs<'a, 'p, 'c> {
 }
 
 pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
+    if let Some(which) = args.as_mesh {
+        which.check()?;
+        return mesh::collide::run(&mesh_args(args));
+    }
     let console = Console::new(args.quiet);
     if let Some(path) = &args.image {
         output::check_apart(path, &args.pair.inputs())?;
@@ -365,6 +372,24 @@ pub(crate) fn options(args: &CollideArgs, a: &Scan) -> Result<CollideOptions, Cl
         .with_margin(args.margin)
         .with_evidence(evidence);
     args.search.apply(options, a)
+}
+
+/// Returns the same options for `mesh-collide`.
+fn mesh_args(args: &CollideArgs) -> MeshCollideArgs {
+    MeshCollideArgs {
+        pair: args.pair.clone(),
+        path: args.path.clone(),
+        first: args.first,
+        all: args.all,
+        contacts: args.contacts.clone(),
+        budget: args.budget,
+        work: args.work,
+        p_min: None,
+        k_min: None,
+        threads: args.threads,
+        json: args.json,
+        quiet: args.quiet,
+    }
 }
 
 /// Writes the summary of the answers along a path, and draws their plot.
@@ -440,11 +465,7 @@ fn answer_one(
     question.tell(out, &asked, args)
 }
 
-/// The number of lines read at a time if several threads answer.
-const BATCH: usize = 1024;
-
-/// Answers line by line, in order; with `--first`, up to the first contact. Holds at most [`BATCH`]
-/// lines.
+/// Answers line by line, in order; with `--first`, up to the first contact.
 fn answer_all(
     question: &Question,
     poses: &mut PoseFile,
@@ -453,40 +474,16 @@ fn answer_all(
     out: &mut Outputs<'_, '_, '_>,
 ) -> Result<(), CliError> {
     let _watch = poses.watch(console, out.results);
-    let threads = args.threads.unwrap_or(1);
-    // With one thread, each line is answered before the next is read.
-    let (pool, most) = if threads == 1 { (None, 1) } else { (Some(pool(threads)?), BATCH) };
-    let (mut lines, mut answers) = (Vec::with_capacity(most), Vec::with_capacity(most));
-    let mut scratch = BatchScratch::default();
-    loop {
-        lines.clear();
-        let read = poses.read_lines(most, &mut lines);
-        let ask = |i: usize, scratch: &mut Scratch| {
-            let (line, text): &(u64, String) = &lines[i];
-            let posed = poses.poses(*line, text, [&question.a, &question.b]);
-            let asked = posed.map(|posed| question.ask(Some(*line), posed, scratch));
-            poses.answered();
-            // Nothing is written after a fault, or after the first contact with --first.
-            let is_last = asked.as_ref().map_or(true, |asked| args.first && asked.is_hit());
-            if is_last { ControlFlow::Break(Some(asked)) } else { ControlFlow::Continue(Some(asked)) }
-        };
-        answers.clear();
-        answers.resize_with(lines.len(), || None);
-        let mut answer = || each(&mut answers, None, &mut scratch, ask);
-        let told = match &pool {
-            Some(pool) => pool.install(answer),
-            None => answer(),
-        };
-        for asked in answers.drain(..).take(told).flatten().chain(read.err().map(Err)) {
-            // Answers to the lines before a faulty one are written before the error.
-            let asked = asked.or_else(|fault| out.results.flush().and(Err(fault)))?;
-            question.tell(out, &asked, args)?;
-            if args.first && asked.is_hit() {
-                return Ok(());
-            }
-        }
-        if lines.len() < most {
-            return Ok(());
-        }
-    }
+    let ask = |poses: &PoseFile, (line, text): &PoseLine, scratch: &mut Scratch| {
+        let posed = poses.poses(*line, text, [&question.a, &question.b])?;
+        let asked = question.ask(Some(*line), posed, scratch);
+        poses.answered();
+        Ok(asked)
+    };
+    let is_last = |asked: &Asked| args.first && asked.is_hit();
+    answer_lines(poses, args.threads.unwrap_or(1), ask, is_last, |asked| {
+        // Answers to the lines before a faulty one are written before the error.
+        let asked = asked.or_else(|fault| out.results.flush().and(Err(fault)))?;
+        question.tell(out, asked, args)
+    })
 }

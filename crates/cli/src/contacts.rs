@@ -22,7 +22,8 @@ pub(crate) const SHOWN: usize = 40;
 pub struct ContactArgs {
     /// Put contacts into one clash if they are at most this far apart, in world units
     ///
-    /// The default is four times the larger sampling radius.
+    /// The default is four times the larger sampling radius; for meshes, the length of the longest
+    /// segment that two triangles have in common.
     #[arg(long, value_name = "LEN", requires = "all", allow_hyphen_values = true, value_parser = parse_radius)]
     pub link: Option<f64>,
     /// Write the contacts of --all as points, with normals of a and the number of their clash
@@ -84,7 +85,8 @@ pub(crate) struct Grouped {
 }
 
 impl Grouped {
-    fn new(contacts: &[Contact], link: f64) -> Self {
+    /// Groups `contacts` that are at most `link` apart, directly or through others.
+    pub(crate) fn new(contacts: &[Contact], link: f64) -> Self {
         let mut groups = ContactGroup::all(contacts, link);
         groups.sort_by(ContactGroup::by_size);
         let numbers = numbers(contacts.len(), groups.iter().map(|group| &group.contacts));
@@ -183,7 +185,7 @@ fn write_csv(contacts: &[Contact], numbers: &[u32], out: &mut impl Write) -> io:
 
 /// Writes the contacts as points in double precision, with the normal of a (zero if points are
 /// compared) and the property `uint clash`.
-fn write_ply(path: &Path, contacts: &[Contact], numbers: &[u32]) -> Result<(), CliError> {
+pub(crate) fn write_ply(path: &Path, contacts: &[Contact], numbers: &[u32]) -> Result<(), CliError> {
     let points: Vec<[f64; 3]> = contacts.iter().map(|contact| contact.point).collect();
     #[expect(clippy::cast_possible_truncation, reason = "unit vectors")]
     let normal = |contact: &Contact| contact.normals.map_or([0.0; 3], |[of_a, _]| of_a.map(|c| c as f32));

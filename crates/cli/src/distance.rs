@@ -9,12 +9,14 @@ use nearmiss::{
 };
 use serde::Serialize;
 
+use crate::as_mesh::{AsMeshName, OF_DISTANCE};
 use crate::console::{Console, Results, now};
 use crate::digits::{rough, short, work};
 use crate::distance_picture::paint_distance;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
+use crate::mesh::distance::DistanceQuestion;
 use crate::parse::parse_duration;
 use crate::path::{PathArgs, PathLog};
 use crate::path_entry::{PathEntry, PathVerdict};
@@ -44,6 +46,9 @@ pub struct DistanceArgs {
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
+    /// Compare the triangles of meshes instead of points; the distance is then exact
+    #[arg(long, value_enum, value_name = "WHICH", conflicts_with_all = OF_DISTANCE)]
+    pub as_mesh: Option<AsMeshName>,
     /// Stop when the bounds differ by at most this share of the upper one: from 0 to less than
     /// 1
     ///
@@ -109,6 +114,10 @@ struct Question<'a> {
 }
 
 pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
+    if let Some(which) = args.as_mesh {
+        which.check()?;
+        return of_meshes(args).run();
+    }
     let console = Console::new(args.quiet);
     if let Some(path) = &args.image {
         output::check_apart(path, &args.pair.inputs())?;
@@ -148,6 +157,13 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
 /// Returns the options of a query. `a` is the first scan.
 pub(crate) fn options(args: &DistanceArgs, a: &Scan) -> DistanceOptions {
     DistanceOptions::default().with_semantics(args.meaning.semantics(a)).with_relative(args.relative)
+}
+
+/// Returns the same question about meshes.
+fn of_meshes(args: &DistanceArgs) -> DistanceQuestion<'_> {
+    let DistanceArgs { pair, path, budget, work, threads, json, quiet, .. } = args;
+    let (budget, work, threads) = (*budget, *work, *threads);
+    DistanceQuestion { pair, path, budget, work, threads, json: *json, quiet: *quiet }
 }
 
 impl Question<'_> {

@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 use nearmiss::io::{PlyError, ReadError};
 use nearmiss::mesh::SampleError;
 use nearmiss::slices::{SliceError, StoreError};
-use nearmiss::{BuildError, GraphError, LoadError, PlanError, SaveError, WorkError};
+use nearmiss::store::{ContainerFault, OpenError};
+use nearmiss::{
+    BuildError, GraphError, LoadError, Mesh, MeshBuildError, PlanError, SaveError, Scan, WorkError,
+};
 use thiserror::Error;
 
 use crate::matrix::PoseRefused;
@@ -44,6 +47,14 @@ pub enum CliError {
         path: PathBuf,
         /// The reason.
         cause: BuildError,
+    },
+    /// A mesh could not be prepared.
+    #[error("{}: {cause}", path.display())]
+    BuildMesh {
+        /// The input.
+        path: PathBuf,
+        /// The reason.
+        cause: MeshBuildError,
     },
     /// A graph could not be built.
     #[error("{}: {cause}", path.display())]
@@ -163,10 +174,13 @@ impl CliError {
         }
     }
 
-    /// Returns a function that wraps an error of opening the prepared scan at `path`.
+    /// Returns a function that wraps an error of opening the prepared scan or mesh at `path`.
     pub(crate) fn loading(path: &Path) -> impl FnOnce(LoadError) -> Self {
         let path = path.to_owned();
-        |cause| Self::Load { path, cause }
+        |cause| match of_other_kind(&cause) {
+            Some(what) => Self::UnsuitableFile { path, what: what.into() },
+            None => Self::Load { path, cause },
+        }
     }
 
     /// Returns the exit status of the process.
@@ -194,6 +208,24 @@ pub(crate) fn plain(cause: &io::Error) -> String {
     let text = text.split(" (os error ").next().unwrap_or_default();
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+}
+
+/// Returns what to do about a prepared mesh where a scan is expected, and the reverse.
+fn of_other_kind(cause: &LoadError) -> Option<&'static str> {
+    let LoadError::Open(OpenError { fault: ContainerFault::Kind { found, expected }, .. }) = cause else {
+        return None;
+    };
+    match (*found, *expected) {
+        (Mesh::KIND, Scan::KIND) => Some(
+            "expected a prepared scan, got a prepared mesh; compare two meshes with `mesh-collide` or `distance --as-mesh \
+             both`, or prepare the input again without --as-mesh",
+        ),
+        (Scan::KIND, Mesh::KIND) => Some(
+            "expected a prepared mesh, got a prepared scan; compare two scans with `collide` or `distance` without \
+             --as-mesh, or prepare the input again with `preprocess --as-mesh`",
+        ),
+        _ => None,
+    }
 }
 
 /// Returns the path as a prefix of a message, unless `cause` names the file itself.

@@ -120,7 +120,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
         output::replace(path, |out| points(&scan, out).map_err(CliError::writing_ply(path)))?;
         wrote(scan.len(), "point", path);
     }
-    let depths = report::depths(&scan);
+    let depths = report::depths(scan.topology());
     let nodes = at_depth(&scan, &depths, args.level).count();
     if let (Some(path), Some(level)) = (&args.samples, args.level) {
         output::replace(path, |out| samples(&scan, level, out).map_err(CliError::writing_ply(path)))?;
@@ -184,7 +184,7 @@ fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), PlyError
     let (mut covering, mut sampling) = (Vec::new(), Vec::new());
     #[expect(clippy::cast_possible_truncation, reason = "radii are single precision")]
     let length = |stored: f32| (f64::from(stored) * frame.scale) as f32;
-    for node in at_depth(scan, &report::depths(scan), Some(level)) {
+    for node in at_depth(scan, &report::depths(scan.topology()), Some(level)) {
         for i in arrays.samples(node).iter() {
             positions.push(frame.to_world(arrays.position(i)));
             source.push(scan.source()[i]);
@@ -206,7 +206,7 @@ const EDGES: [[u64; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 fn boxes(scan: &Scan, level: Option<u32>, out: &mut dyn Write) -> io::Result<()> {
-    let depths = report::depths(scan);
+    let depths = report::depths(scan.topology());
     writeln!(out, "# node boxes, eight corners and twelve edges each")?;
     let mut first = 1_u64;
     let all: Vec<_> = scan.boxes().collect();

@@ -233,8 +233,8 @@ pub(crate) fn identity(path: &Path) -> Result<String, CliError> {
 pub(crate) fn check_raw(path: &Path) -> Result<(), CliError> {
     check_there(path)?;
     if is_prepared(path) {
-        let what = "expected a point cloud or mesh, got a prepared scan (by its content or name); give the file that \
-                    it was prepared from"
+        let what = "expected a point cloud or mesh, got a prepared scan or mesh (by its content or name); give the file \
+                    that it was prepared from"
             .into();
         return Err(CliError::UnsuitableFile { path: path.to_owned(), what });
     }

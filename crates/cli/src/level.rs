@@ -39,7 +39,7 @@ const MANY: usize = 1000;
 pub fn level_picture(scan: &Scan, depths: &[u32]) -> Picture {
     let width = depths.len() * (PANEL + GAP) + GAP;
     let mut canvas = Canvas::new(width, PANEL + 2 * GAP + 3 * LINE, GROUND);
-    let all = report::depths(scan);
+    let all = report::depths(scan.topology());
     let levels = depths.iter().map(|&depth| (depth, at_depth(scan, &all, Some(depth)).collect()));
     let levels: Vec<(u32, Vec<usize>)> = levels.collect();
     let nodes = levels.iter().flat_map(|(_, nodes)| nodes);

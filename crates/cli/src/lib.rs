@@ -12,6 +12,7 @@ mod error;
 mod eval;
 mod export;
 mod inspect;
+mod mesh;
 mod poses;
 mod preprocess;
 mod proof;
@@ -19,6 +20,7 @@ mod sample;
 mod slices;
 mod touch;
 
+mod as_mesh;
 mod estimate;
 mod filters;
 mod guarded;
@@ -30,6 +32,7 @@ mod parse;
 mod path;
 mod path_entry;
 mod path_plot;
+mod pose_batch;
 mod pose_text;
 mod posing;
 mod progress;
@@ -70,6 +73,7 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+pub use as_mesh::AsMeshName;
 pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
 pub use clash::ClashArgs;
@@ -92,6 +96,7 @@ pub use level::level_picture;
 pub use matrix::PoseRefused;
 pub use meaning::MeaningArgs;
 pub use memory::MemoryArgs;
+pub use mesh::args::MeshCollideArgs;
 pub use path::PathArgs;
 pub use picture::contact_picture;
 pub use poses::PosesArgs;
@@ -129,6 +134,12 @@ Examples:
   nearmiss clash pump.nm hall.nm --csv clashes.csv --html clashes.html
   nearmiss clash pump.nm hall.nm --json";
 
+const MESH_COLLIDE_EXAMPLES: &str = "\
+Examples:
+  nearmiss mesh-collide part.nm hall.nm --pose-a \"1 0 0 2.5  0 1 0 0.8  0 0 1 0  0 0 0 1\"
+  nearmiss mesh-collide part.nm hall.nm --poses path.txt --csv path.csv --plot path.svg
+  nearmiss mesh-collide part.stl hall.obj --all --ply contacts.ply";
+
 const CONVERT_EXAMPLES: &str = "\
 Examples:
   nearmiss convert survey.laz survey.ply --class 2,6
@@ -154,12 +165,14 @@ Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius
 #[non_exhaustive]
 pub enum Command {
     /// Prepare a point cloud or mesh for fast queries, and save it
-    #[command(after_long_help = "Example:\n  nearmiss preprocess dragon.ply -o dragon.nm")]
+    #[command(
+        after_long_help = "Examples:\n  nearmiss preprocess dragon.ply -o dragon.nm\n  nearmiss preprocess part.stl -o part.nm --as-mesh"
+    )]
     Preprocess(PreprocessArgs),
     /// Convert points from one file format to another; files may be larger than memory
     #[command(after_long_help = CONVERT_EXAMPLES)]
     Convert(ConvertArgs),
-    /// Describe a prepared scan: size, spacing, health, advice
+    /// Describe a prepared scan or mesh: size, spacing, health, advice
     #[command(after_long_help = "Example:\n  nearmiss inspect dragon.nm --verify")]
     Inspect(InspectArgs),
     /// Evaluate the implicit surface of a scan at given points
@@ -170,6 +183,13 @@ pub enum Command {
     /// Test whether two scans touch, where, and how near they come
     #[command(after_long_help = COLLIDE_EXAMPLES)]
     Collide(CollideArgs),
+    /// Test whether the triangles of two meshes meet, and where
+    #[command(
+        after_long_help = MESH_COLLIDE_EXAMPLES,
+        mut_arg("a", |a| a.help("First mesh: prepared (.nm), or a file with faces, which is prepared on the fly")),
+        mut_arg("b", |b| b.help("Second mesh")),
+    )]
+    MeshCollide(MeshCollideArgs),
     /// List all places where two scans touch or come too close: table, CSV, HTML page
     #[command(after_long_help = CLASH_EXAMPLES)]
     Clash(ClashArgs),
@@ -212,6 +232,7 @@ impl Command {
             Self::Inspect(args) => vec![&args.file],
             Self::Eval(args) => vec![&args.file],
             Self::Collide(args) => vec![&args.pair.a, &args.pair.b],
+            Self::MeshCollide(args) => vec![&args.pair.a, &args.pair.b],
             Self::Clash(args) => vec![&args.pair.a, &args.pair.b],
             Self::Curve(args) => vec![&args.pair.a, &args.pair.b],
             Self::Distance(args) => vec![&args.pair.a, &args.pair.b],
@@ -234,6 +255,7 @@ impl Command {
             Self::Inspect(args) => inspect::run(args),
             Self::Eval(args) => eval::run(args),
             Self::Collide(args) => collide::run(args),
+            Self::MeshCollide(args) => mesh::collide::run(args),
             Self::Clash(args) => clash::run(args),
             Self::Curve(args) => curve::run(args),
             Self::Density(args) => density::run(args),

@@ -16,6 +16,8 @@ pub struct PoseRefused {
     pub cause: PoseError,
     /// `true` if the transpose has the form of a pose.
     pub is_transposed: bool,
+    /// The length by which making a matrix a pose may move the object's bounds, in words.
+    pub allowed: &'static str,
 }
 
 impl fmt::Display for PoseRefused {
@@ -37,9 +39,10 @@ impl fmt::Display for PoseRefused {
             PoseError::NotRigid { moved, tolerance } => write!(
                 f,
                 "expected a rotation with uniform scale, got a matrix whose nearest rotation moves the object's bounds \
-                 by {}, more than {} (a tenth of the sampling radius); give it with more digits, or as a quaternion",
+                 by {}, more than {} ({}); give it with more digits, or as a quaternion",
                 short(*moved),
-                short(*tolerance)
+                short(*tolerance),
+                self.allowed
             ),
             cause => write!(f, "{cause}"),
         }

@@ -30,6 +30,17 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     time.ok_or_else(|| "expected a time of zero or more, such as 200us".into())
 }
 
+/// The largest number of threads; more do not help, and may not start.
+const MOST_THREADS: usize = 1024;
+
+/// Parses a number of threads.
+pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n <= MOST_THREADS => Ok(n),
+        _ => Err(format!("expected a number from 0 (all cores) to {MOST_THREADS}")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

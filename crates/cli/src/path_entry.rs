@@ -27,7 +27,8 @@ pub(crate) enum PathVerdict {
 }
 
 impl PathVerdict {
-    fn word(self) -> &'static str {
+    /// Returns the verdict in tables and JSON.
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Separated => "separated",
             Self::Undecided => "undecided",

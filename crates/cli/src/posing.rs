@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::{Pose, PoseError, Scan};
+use nearmiss::{Aabb, Pose, PoseError, Scan};
 
 use crate::console::{Console, Results};
 use crate::error::CliError;
@@ -90,10 +90,33 @@ impl PairArgs {
     }
 }
 
+/// An object that poses place in the world.
+pub(crate) trait Posable {
+    /// Returns the bounds in the frame of the input.
+    fn bounds(&self) -> &Aabb;
+
+    /// Returns the length by which making a matrix a pose may move the bounds, in the units of the
+    /// object, and that length in words.
+    fn tolerance(&self) -> (f64, &'static str);
+}
+
+impl Posable for Scan {
+    fn bounds(&self) -> &Aabb {
+        nearmiss::PointHierarchy::bounds(self)
+    }
+
+    fn tolerance(&self) -> (f64, &'static str) {
+        (0.1 * self.sampling_radius(), "a tenth of the sampling radius")
+    }
+}
+
 /// Returns the poses nearest to the matrices of `--pose-a` and `--pose-b`.
-pub(crate) fn of_options(matrices: &[Matrix; 2], scans: [&Scan; 2]) -> Result<[Pose; 2], CliError> {
+pub(crate) fn of_options<T: Posable + ?Sized>(
+    matrices: &[Matrix; 2],
+    objects: [&T; 2],
+) -> Result<[Pose; 2], CliError> {
     let placed = |name: &str, side: usize| {
-        of_scan(&matrices[side], scans[side])
+        of_object(&matrices[side], objects[side])
             .map_err(|refused| CliError::Pose { place: name.into(), refused })
     };
     Ok([placed("--pose-a", 0)?, placed("--pose-b", 1)?])
@@ -119,19 +142,20 @@ pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, C
     Err(CliError::Usage(format!("{option}: expected {FORMS}, or a file that holds them, got `{given}`")))
 }
 
-/// Returns the pose nearest to `matrix`. Fails if it moves the scan's bounds by more than a tenth
-/// of its sampling radius.
-pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseRefused> {
+/// Returns the pose nearest to `matrix`. Fails if it moves the object's bounds by more than its
+/// [tolerance](Posable::tolerance).
+pub(crate) fn of_object<T: Posable + ?Sized>(matrix: &Matrix, object: &T) -> Result<Pose, PoseRefused> {
     let row = |i: usize| [matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]];
     let [x, y, z] = [row(0), row(1), row(2)];
     let determinant = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
         + x[2] * (y[0] * z[1] - y[1] * z[0]);
-    // In world units, so the sampling radius is scaled as the object is.
-    let tolerance = 0.1 * scan.sampling_radius() * determinant.abs().cbrt();
-    Pose::from_row_major(matrix, scan.bounds(), tolerance).map_err(|cause| {
+    // In world units, so the tolerance is scaled as the object is.
+    let (tolerance, allowed) = object.tolerance();
+    let tolerance = tolerance * determinant.abs().cbrt();
+    Pose::from_row_major(matrix, object.bounds(), tolerance).map_err(|cause| {
         let last_column = [3, 7, 11, 15].map(|i| matrix[i]);
         let is_transposed = cause == PoseError::NotAffine && last_column == [0.0, 0.0, 0.0, 1.0];
-        PoseRefused { cause, is_transposed }
+        PoseRefused { cause, is_transposed, allowed }
     })
 }
 
@@ -231,18 +255,13 @@ impl PoseFile {
         }
     }
 
-    /// Reads up to `most` lines. After an error, `lines` holds the lines before the faulty one.
-    pub(crate) fn read_lines(&mut self, most: usize, lines: &mut Vec<(u64, String)>) -> Result<(), CliError> {
-        while lines.len() < most
-            && let Some(line) = self.next_line()?
-        {
-            lines.push(line);
-        }
-        Ok(())
-    }
-
     /// Parses the poses on line `number`, whose text is `text`.
-    pub(crate) fn poses(&self, number: u64, text: &str, scans: [&Scan; 2]) -> Result<Posed, CliError> {
+    pub(crate) fn poses<T: Posable + ?Sized>(
+        &self,
+        number: u64,
+        text: &str,
+        objects: [&T; 2],
+    ) -> Result<Posed, CliError> {
         let format = self.format.as_ref().unwrap_or(&PoseFormat::Json);
         let row = format.read(text).map_err(|what| self.lines.fault_on(number, what))?;
         let pose = |side: usize| {
@@ -257,7 +276,7 @@ impl PoseFile {
                 (None, Some(fixed)) => fixed,
                 (None, None) => Pose::IDENTITY.to_row_major(),
             };
-            of_scan(&scaled(matrix, self.factors[side]), scans[side])
+            of_object(&scaled(matrix, self.factors[side]), objects[side])
                 .map_err(|refused| format!("`{name}`: {refused}"))
         };
         let placed = pose(0).and_then(|a| Ok([a, pose(1)?]));

@@ -1,6 +1,7 @@
 //! `preprocess`: prepares a scan and saves it.
 
 mod args;
+mod as_mesh;
 mod on_disk;
 mod outcome;
 
@@ -16,12 +17,16 @@ use crate::report::ScanReport;
 use crate::threads::pool;
 use outcome::{Seconds, save, tell};
 
+pub(crate) use crate::parse::parse_threads;
 pub use args::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, WeightName};
-pub(crate) use args::{graph_options, options, parse_format, parse_threads};
+pub(crate) use args::{graph_options, options, parse_format};
 
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;
     let console = Console::new(args.quiet);
+    if args.as_mesh {
+        return as_mesh::run(args, console);
+    }
 
     let forecast = forecast(args, console);
     let is_announced = match foresee(args, &forecast)? {

@@ -1,6 +1,7 @@
 //! Results, as JSON and as text.
 
 use nearmiss::graph::ClosePairs;
+use nearmiss::hierarchy::Topology;
 use nearmiss::{
     Answer, Contact, Contacts, Evidence, ManifoldPoint, Metric, PointKind, Reason, Scan, SurfaceGraph,
     Verdict,
@@ -110,7 +111,7 @@ impl ScanReport {
         let scale = scan.frame().scale;
         let median = median(scan.radii());
         let nodes = scan.topology().len();
-        let (leaves, depth_mean) = leaves(scan);
+        let (leaves, depth_mean) = leaves(scan.topology());
         Self {
             points: scan.len(),
             dropped: DroppedReport {
@@ -196,16 +197,15 @@ impl ScanReport {
 
 /// Returns the number of leaves and their mean depth. The root has depth 0.
 #[expect(clippy::cast_precision_loss, reason = "statistics")]
-fn leaves(scan: &Scan) -> (usize, f64) {
-    let depths = depths(scan);
-    let of_leaves = &depths[scan.topology().inner()..];
+pub(crate) fn leaves(topology: &Topology) -> (usize, f64) {
+    let depths = depths(topology);
+    let of_leaves = &depths[topology.inner()..];
     let sum: u64 = of_leaves.iter().map(|&depth| u64::from(depth)).sum();
     (of_leaves.len(), sum as f64 / of_leaves.len() as f64)
 }
 
 /// Returns the depth of each node, at most 32.
-pub(crate) fn depths(scan: &Scan) -> Vec<u8> {
-    let topology = scan.topology();
+pub(crate) fn depths(topology: &Topology) -> Vec<u8> {
     let mut depths = vec![0; topology.len()];
     // Parents come before their children.
     for id in topology.ids().take(topology.inner()) {

@@ -110,15 +110,16 @@ pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
     if !answer.verdict.is_separated() {
         return None;
     }
-    let [a, b] = views.map(world_bounds);
+    far_apart(views.map(world_bounds))
+}
+
+/// Returns a hint if the gap between two bounding boxes exceeds the size of both.
+pub(crate) fn far_apart([a, b]: [Aabb; 2]) -> Option<String> {
     let apart = (0..3).map(|k| (a.min[k] - b.max[k]).max(b.min[k] - a.max[k]).max(0.0).powi(2)).sum::<f64>();
     let apart = apart.sqrt();
     let size = [a, b].map(|bounds| 2.0 * bounds.half_extents().into_iter().fold(0.0, f64::max));
     (apart > size[0].max(size[1])).then(|| {
-        format!(
-            "hint: the bounding boxes are {} apart; check the frames and poses of the scans",
-            short(apart)
-        )
+        format!("hint: the bounding boxes are {} apart; check the frames and poses of both", short(apart))
     })
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::{Aabb, NearestPoint, Placed, Pose, Shape, ShapeIndex};
+use nearmiss::{Aabb, NearestPoint, Placed, Pose, PoseError, Shape, ShapeIndex};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
     let scan = opening.open(&args.scan)?;
-    let pose = posing::of_scan(&matrix, &scan)
+    let pose = posing::of_object(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
     let (placed, mut index) = (scan.at(&pose), None);
     // The sampling radius in world units.
@@ -212,8 +212,12 @@ fn solid(pose: &[f64; 16], half: [f64; 3], r: f64) -> Result<Shape, String> {
     let half = [positive("half", half[0])?, positive("half", half[1])?, positive("half", half[2])?];
     let bounds = Aabb { min: half.map(|h| -h), max: half };
     let pose = Pose::from_row_major(pose, &bounds, 0.1 * r);
-    let pose = pose.map_err(|cause| format!("`pose`: {}", PoseRefused { cause, is_transposed: false }))?;
+    let pose = pose.map_err(|cause| format!("`pose`: {}", refused(cause)))?;
     Ok(Shape::Box { pose, half })
+}
+
+fn refused(cause: PoseError) -> PoseRefused {
+    PoseRefused { cause, is_transposed: false, allowed: "a tenth of the sampling radius" }
 }
 
 fn positive(name: &str, length: f64) -> Result<f64, String> {

@@ -110,19 +110,25 @@ impl SizeCheck {
 
     /// Warns if the first views compared differ too much in size.
     pub(crate) fn compare(&self, views: [&Placed<'_>; 2]) {
+        let size = |view: &Placed<'_>| {
+            let scan = view.scan();
+            diagonal(scan.bounds()) * view.stored_to_world().scale() / scan.frame().scale
+        };
+        self.compare_sizes(|| views.map(size));
+    }
+
+    /// As [`Self::compare`], for objects whose bounds have diagonals of these lengths in the world.
+    pub(crate) fn compare_sizes(&self, sizes: impl FnOnce() -> [f64; 2]) {
         self.once.call_once(|| {
-            let size = |view: &Placed<'_>| {
-                let scan = view.scan();
-                diagonal(scan.bounds()) * view.stored_to_world().scale() / scan.frame().scale
-            };
-            if let Some(question) = question(views.map(size), self.factors) {
+            if let Some(question) = question(sizes(), self.factors) {
                 self.console.note(format_args!("warning: {question}"));
             }
         });
     }
 }
 
-fn diagonal(bounds: &Aabb) -> f64 {
+/// Returns the length of the diagonal of a box.
+pub(crate) fn diagonal(bounds: &Aabb) -> f64 {
     2.0 * bounds.half_extents().iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 

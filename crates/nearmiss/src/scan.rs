@@ -18,9 +18,6 @@ use serde::{Deserialize, Serialize};
 
 pub use nearmiss_store::{LoadError, WriteError as SaveError};
 
-/// Kind of the container of a scan.
-const KIND: [u8; 4] = *b"SCAN";
-
 /// Version of the layout of a scan's sections and metadata.
 const VERSION: u32 = 10;
 
@@ -73,6 +70,9 @@ impl Deref for Scan {
 }
 
 impl Scan {
+    /// The kind of the container of a scan, as [`File::kind`] returns it.
+    pub const KIND: [u8; 4] = *b"SCAN";
+
     fn of(hierarchy: PointHierarchy, graph: Option<Arc<SurfaceGraph>>) -> Self {
         Self { hierarchy: Arc::new(hierarchy), graph, shapes: None, density: None }
     }
@@ -324,7 +324,7 @@ impl Scan {
     }
 
     fn writer(&self, meta: &ScanMeta) -> Result<Writer<'_>, SaveError> {
-        let mut writer = Writer::new(KIND, VERSION);
+        let mut writer = Writer::new(Self::KIND, VERSION);
         writer.metadata(meta)?;
         self.hierarchy.add_to(&mut writer)?;
         if let Some(graph) = &self.graph {
@@ -369,7 +369,7 @@ impl Scan {
     }
 
     fn load(file: &File, check: Check) -> Result<Self, LoadError> {
-        file.expect(KIND, OLDEST..=VERSION)?;
+        file.expect(Self::KIND, OLDEST..=VERSION)?;
         let meta: ScanMeta = file.metadata()?;
         let hierarchy = PointHierarchy::load(file, meta.hierarchy, check)?;
         let samples = (hierarchy.plan(), hierarchy.radii());

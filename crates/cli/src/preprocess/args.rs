@@ -10,6 +10,7 @@ use crate::eval::KernelName;
 use crate::filters::FilterArgs;
 use crate::input::pieces;
 use crate::memory::MemoryArgs;
+use crate::parse::{parse_length, parse_threads};
 
 /// Options of `preprocess`.
 #[derive(Debug, Clone, Args)]
@@ -19,7 +20,7 @@ pub struct PreprocessArgs {
     ///
     /// The points of a mesh are its vertices; `nearmiss sample` puts points on its faces.
     pub input: PathBuf,
-    /// Prepared scan to write, usually named .nm; an existing file is replaced in one step
+    /// Prepared scan or mesh to write, usually named .nm; an existing file is replaced in one step
     #[arg(short, long, value_name = "OUT.nm")]
     pub output: PathBuf,
     /// Format of the input; auto decides by content, then by name
@@ -27,6 +28,15 @@ pub struct PreprocessArgs {
     /// Known formats: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf.
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
+    /// Prepare the triangles of a mesh, for `mesh-collide` and `--as-mesh` of other commands
+    ///
+    /// Triangles without area and repeated triangles are dropped. By default, only the vertices of
+    /// a mesh are prepared, as points.
+    #[arg(long, conflicts_with_all = OF_SCANS)]
+    pub as_mesh: bool,
+    /// Weld vertices over this distance, with --as-mesh; by default, only equal ones are welded
+    #[arg(long, value_name = "LEN", requires = "as_mesh", allow_hyphen_values = true, value_parser = parse_length)]
+    pub weld: Option<f64>,
     /// The filters
     #[command(flatten)]
     pub filters: FilterArgs,
@@ -93,6 +103,26 @@ pub struct PreprocessArgs {
     pub quiet: bool,
 }
 
+/// The options that apply to scans and not to meshes.
+const OF_SCANS: [&str; 16] = [
+    "crop",
+    "class",
+    "voxel",
+    "remove_outliers",
+    "min_neighbours",
+    "radius_neighbours",
+    "reach",
+    "weight",
+    "bandwidth",
+    "leaf",
+    "graph",
+    "neighbours",
+    "close_pairs",
+    "paths",
+    "kernel",
+    "scanner",
+];
+
 /// A format, or `None` to detect it from content and name.
 #[derive(Debug, Clone, Copy)]
 pub struct FormatChoice(
@@ -154,16 +184,6 @@ fn parse_bandwidth(text: &str) -> Result<Bandwidth, String> {
 fn parse_reach(text: &str) -> Result<f64, String> {
     let reach = text.parse().ok().filter(|reach: &f64| *reach > 0.0 && reach.is_finite());
     reach.ok_or_else(|| "expected a length of more than zero, in the units of the input".into())
-}
-
-/// The largest number of threads; more do not help, and may not start.
-const MOST_THREADS: usize = 1024;
-
-pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(n) if n <= MOST_THREADS => Ok(n),
-        _ => Err(format!("expected a number from 0 (all cores) to {MOST_THREADS}")),
-    }
 }
 
 impl PreprocessArgs {

@@ -70,6 +70,16 @@ impl MeshHierarchy {
         Err(Flaw::Metadata { what })
     }
 
+    /// Checks that every triangle has a place of its own in an input of `given` triangles.
+    fn check_sources(&self, given: u32) -> Result<(), Flaw> {
+        const WHAT: &str = "the place in the input of triangle";
+        Flaw::first(WHAT, self.arrays.source.iter().position(|&place| place >= given))?;
+        let mut order: Vec<usize> = (0..self.len()).collect();
+        order.sort_by_key(|&i| (self.arrays.source[i], i));
+        let is_same = |two: &&[usize]| self.arrays.source[two[0]] == self.arrays.source[two[1]];
+        Flaw::first(WHAT, order.windows(2).find(is_same).map(|two| two[1]))
+    }
+
     /// Checks what correct answers need in addition, given a valid structure: boxes within their
     /// parents', leaves that hold their triangles, vertices within the bounds. One pass over the
     /// whole.
@@ -83,10 +93,7 @@ impl MeshHierarchy {
         Flaw::first("vertex", vertices.iter().position(|p| !bounds.contains(*p)))?;
         let is_known = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < vertices.len());
         Flaw::first("triangle", triangles.iter().position(|t| !is_known(t)))?;
-        Flaw::first(
-            "the place in the input of triangle",
-            self.arrays.source.iter().position(|s| s >= given),
-        )?;
+        self.check_sources(*given)?;
         let wrong = self.arrays.cells.iter().position(|&count| !(1..=CELLS).contains(&count));
         Flaw::first("the number of filled cells of node", wrong)?;
         if *bounds != Aabb::of(vertices.iter().copied()) || *frame != Frame::around(bounds.min, bounds.max) {
@@ -107,9 +114,13 @@ impl MeshHierarchy {
                 if self.arrays.blocks[number] != TriangleBlock::new(&corners) {
                     return Err(Flaw::Value { what: "leaf", index: number });
                 }
-                let leaf = self.topology.leaf(number);
-                if !tree.bounds(leaf).holds(corners.iter().flatten().copied()) {
-                    return Err(Flaw::Value { what: "the box of node", index: leaf.index() });
+                // A box may lie within its parent's and still be too small for its triangles.
+                let mut node = Some(self.topology.leaf(number));
+                while let Some(id) = node {
+                    if !tree.bounds(id).holds(corners.iter().flatten().copied()) {
+                        return Err(Flaw::Value { what: "the box of node", index: id.index() });
+                    }
+                    node = self.topology.parent(id).map(|(parent, _)| parent);
                 }
             }
             Ok(())

@@ -5,7 +5,9 @@
 mod cost;
 mod damage;
 mod exercise;
+pub(crate) mod exercise_mesh;
 mod faults;
 mod graph;
+mod meshes;
 mod mutations;
 mod repair;

@@ -9,4 +9,5 @@ mod hostile;
 mod invariance;
 mod obstacles;
 mod saved;
+mod saved_meshes;
 mod threads;

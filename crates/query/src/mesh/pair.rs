@@ -56,7 +56,7 @@ pub struct MeshQuality {
     /// The probability from which on a pair of nodes counts as colliding, p_min. 1, the default, to
     /// stop only at two triangles that meet.
     pub p_min: f64,
-    /// The number of such pairs at which the search stops, k_min. Default: 10.
+    /// The number of such pairs at which the search stops, k_min. Default: 3.
     pub k_min: u32,
     /// The number of cells that both surfaces must fill in a collision, 1 to 16. Default: 4.
     pub shared: u32,
@@ -64,7 +64,7 @@ pub struct MeshQuality {
 
 impl Default for MeshQuality {
     fn default() -> Self {
-        Self { p_min: 1.0, k_min: 10, shared: 4 }
+        Self { p_min: 1.0, k_min: 3, shared: 4 }
     }
 }
 

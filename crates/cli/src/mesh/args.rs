@@ -1,0 +1,69 @@
+//! The options of `mesh-collide`.
+
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::contacts::ContactArgs;
+use crate::parse::{parse_duration, parse_threads};
+use crate::path::PathArgs;
+use crate::posing::PairArgs;
+
+/// Options of `mesh-collide`.
+#[derive(Debug, Clone, Args)]
+pub struct MeshCollideArgs {
+    /// The meshes and their poses
+    #[command(flatten)]
+    pub pair: PairArgs,
+    /// The options for many poses
+    #[command(flatten)]
+    pub path: PathArgs,
+    /// Stop at the first contact of --poses
+    #[arg(long, requires = "poses")]
+    pub first: bool,
+    /// Find all contacts, not one
+    ///
+    /// One contact is reported for each pair of triangles that meet.
+    #[arg(long)]
+    pub all: bool,
+    /// The treatment of the contacts
+    #[command(flatten)]
+    pub contacts: ContactArgs,
+    /// Time limit for each query, such as 200us
+    ///
+    /// The unit is ns, us, ms or s. When time runs out, the answer is undecided.
+    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
+    pub budget: Option<Duration>,
+    /// Work limit for each query; reproducible, unlike time
+    ///
+    /// A unit is one node pair; 500 to 10000 is common.
+    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    pub work: Option<u64>,
+    /// Probability from which on a pair of nodes counts as colliding
+    ///
+    /// The search then visits the most probable pairs first, and stops once --k-min of them count.
+    /// A separation and a contact of triangles stay exact (Klein & Zachmann 2003).
+    #[arg(long, value_name = "P", value_parser = parse_probability, conflicts_with = "all", help_heading = "Budget and evidence")]
+    pub p_min: Option<f64>,
+    /// Number of such pairs at which the search stops [default: 3]
+    #[arg(long, value_name = "K", requires = "p_min", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Budget and evidence")]
+    pub k_min: Option<u32>,
+    /// Threads; 0 for all cores
+    ///
+    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The
+    /// answers do not depend on it.
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
+    pub threads: Option<usize>,
+    /// Print one JSON object for each query
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
+    pub quiet: bool,
+}
+
+/// Parses a probability.
+fn parse_probability(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|p| (0.0..=1.0).contains(p));
+    number.ok_or_else(|| format!("expected a probability from 0 to 1, got `{text}`"))
+}
