@@ -1,4 +1,4 @@
-//! Whether a mesh meets a scan, and all contacts.
+//! The collision query of a mesh and a scan, and all contacts.
 
 use nearmiss_hierarchy::{NodePair, Plunging, descend};
 
