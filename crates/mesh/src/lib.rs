@@ -18,5 +18,5 @@ pub use contact::{TriangleContact, triangle_contact, unit_normal};
 pub use distance::{TriangleDistance, triangle_distance};
 pub use lattice::{Lattice, lattice_samples};
 pub use meet::triangles_meet;
-pub use sample::{SampleError, SampleOptions, SampleSize, sample};
+pub use sample::{SampleError, SampleOptions, SamplePattern, SampleSize, sample};
 pub use triangle::Corners;
