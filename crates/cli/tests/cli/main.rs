@@ -21,5 +21,6 @@ mod paths;
 mod prepare;
 mod routing;
 mod running;
+mod sampling;
 mod slicing;
 mod touching;

@@ -2,6 +2,7 @@
 //! the nearest neighbours (Yuksel 2015).
 
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 
 use super::cells::Cells;
 
@@ -16,6 +17,9 @@ const GAMMA: f64 = 1.5;
 
 /// Least mean number of neighbours of a candidate. On a large surface there are 18.
 const NEIGHBOURS: usize = 8;
+
+/// Radius beyond which it is not increased, as its square must be finite.
+const WIDEST: f64 = 1e150;
 
 /// Returns an empty table with memory for `all` candidates, of which `count` are to be kept, on a
 /// surface of area `area`.
@@ -51,12 +55,14 @@ pub(crate) fn eliminate(mut candidates: Cells, count: u32) -> Vec<[f64; 3]> {
     let mut heap = BinaryHeap::from(heap);
     let mut left = all;
     while left > count as usize {
-        let Some((known, tie, i)) = heap.pop() else { break };
+        let Some(mut top) = heap.peek_mut() else { break };
+        let (known, _, i) = *top;
         let now = order(weights[i as usize]);
         if now != known {
-            heap.push((now, tie, i));
+            top.0 = now;
             continue;
         }
+        PeekMut::pop(top);
         candidates.remove(i);
         weights[i as usize] = f64::NAN;
         left -= 1;
@@ -88,7 +94,7 @@ fn widen(cells: &mut Cells) -> f64 {
                 seen > 2 * NEIGHBOURS
             });
         }
-        if near >= enough * asked().count() || !cells.radius().is_normal() {
+        if near >= enough * asked().count() || cells.radius() > WIDEST {
             return cells.radius();
         }
         cells.resize(std::f64::consts::SQRT_2 * cells.radius());
