@@ -235,7 +235,8 @@ fn expected_samples(mesh: &TriangleMesh, options: &SampleOptions) -> (f64, Cost)
 fn darts(mesh: &TriangleMesh, spacing: f64) -> f64 {
     // Random discs without overlap cover 54.7 % of a surface; their diameter is 0.95 spacings.
     let density = 0.547 * 4.0 / std::f64::consts::PI / (0.95 * spacing).powi(2);
-    let area: f64 = (0..mesh.triangles().len()).map(|i| 0.5 * base_and_height(mesh, i).iter().product::<f64>()).sum();
+    let area: f64 =
+        (0..mesh.triangles().len()).map(|i| 0.5 * base_and_height(mesh, i).iter().product::<f64>()).sum();
     area * density
 }
 

@@ -69,7 +69,8 @@ fn turned(mesh: &TriangleMesh) -> TriangleMesh {
 
 /// A box with a corner at the origin.
 fn cuboid([x, y, z]: Point) -> TriangleMesh {
-    let corner = |bits: u8| [(0, x), (1, y), (2, z)].map(|(k, side)| if bits >> k & 1 == 1 { side } else { 0.0 });
+    let corner =
+        |bits: u8| [(0, x), (1, y), (2, z)].map(|(k, side)| if bits >> k & 1 == 1 { side } else { 0.0 });
     let vertices = (0..8).map(corner).collect();
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
@@ -192,11 +193,10 @@ fn each_side_of_a_thin_sheet_is_covered() {
 /// Between 0.65 and 0.85 for good blue noise (Lagae & Dutré 2008).
 #[test]
 fn the_relative_radius_is_that_of_blue_noise() {
-    let square = of_triangles(&[[[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]], [
-        [0.0; 3],
-        [1.0, 1.0, 0.0],
-        [0.0, 1.0, 0.0],
-    ]]);
+    let square = of_triangles(&[
+        [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]],
+        [[0.0; 3], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+    ]);
     for (name, mesh) in [("torus", torus(60, 40)), ("cube", cuboid([1.0; 3])), ("square", square)] {
         for seed in 0..3 {
             for samples in [SampleSize::Count(2000), SampleSize::Spacing((area(&mesh) / 2000.0).sqrt())] {
@@ -219,20 +219,19 @@ fn the_relative_radius_is_that_of_blue_noise() {
 #[test]
 fn a_number_of_samples_is_met_exactly() {
     let thin = of_triangles(&[NEEDLE]);
-    let mixed = of_triangles(&[TRIANGLE, [[9.0; 3]; 3], NEEDLE, [[4.0, 0.0, 0.0], [5.0, 0.0, 0.0], [6.0, 0.0, 0.0]]]);
+    let mixed =
+        of_triangles(&[TRIANGLE, [[9.0; 3]; 3], NEEDLE, [[4.0, 0.0, 0.0], [5.0, 0.0, 0.0], [6.0, 0.0, 0.0]]]);
     for mesh in [&cuboid([1.0, 1.0, 1e-3]), &of_triangles(&[TRIANGLE]), &thin, &mixed, &torus(90, 60)] {
         for count in [1, 2, 3, 7, 100, 1501] {
             let points = blue_noise(mesh, SampleSize::Count(count), 5);
             assert_eq!(points.len(), count as usize);
             assert_eq!(points, blue_noise(mesh, SampleSize::Count(count), 5));
         }
-        assert_ne!(
-            blue_noise(mesh, SampleSize::Count(100), 1),
-            blue_noise(mesh, SampleSize::Count(100), 2)
-        );
+        assert_ne!(blue_noise(mesh, SampleSize::Count(100), 1), blue_noise(mesh, SampleSize::Count(100), 2));
     }
     // Samples of a needle are spread along it.
-    let mut along: Vec<f64> = blue_noise(&thin, SampleSize::Count(100), 0).iter().map(|p| p[0] / 5.0).collect();
+    let mut along: Vec<f64> =
+        blue_noise(&thin, SampleSize::Count(100), 0).iter().map(|p| p[0] / 5.0).collect();
     along.sort_by(f64::total_cmp);
     let steps = along.windows(2).map(|pair| pair[1] - pair[0]);
     let [least, most] = [steps.clone().fold(1.0, f64::min), steps.fold(0.0, f64::max)];

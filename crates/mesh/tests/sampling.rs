@@ -53,8 +53,7 @@ fn off_the_mesh(p: [f64; 3]) -> f64 {
 fn no_place_is_further_from_a_sample_than_asked() {
     for pattern in [SamplePattern::Regular, SamplePattern::Random, SamplePattern::BlueNoise] {
         for spacing in [0.5, 0.13] {
-            let options =
-                SampleOptions::new(SampleSize::Spacing(spacing)).with_pattern(pattern).with_seed(3);
+            let options = SampleOptions::new(SampleSize::Spacing(spacing)).with_pattern(pattern).with_seed(3);
             let points = sample(&mesh(), &options).unwrap();
             let mut farthest = 0.0_f64;
             for corners in CORNERS {

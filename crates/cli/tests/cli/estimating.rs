@@ -74,9 +74,17 @@ fn samples_that_do_not_fit_into_memory_are_refused_before_they_are_made() {
     place.ok(&[&wider[..], &regular].concat());
 
     let spaced = ["sample", "plate.obj", "-o", "plate.ply", "--spacing", "0.1", "--memory", "60MB"];
-    place.refused(1, &spaced, &["about 770,000 samples need about 86 MB", "use --spacing 0.1", "--memory 90MB"]);
+    place.refused(
+        1,
+        &spaced,
+        &["about 770,000 samples need about 86 MB", "use --spacing 0.1", "--memory 90MB"],
+    );
     let counted = ["sample", "plate.obj", "-o", "plate.ply", "--points", "200000", "--memory", "60MB"];
-    place.refused(1, &counted, &["200,000 samples need about 110 MB", "use --points 69000", "--memory 111MB"]);
+    place.refused(
+        1,
+        &counted,
+        &["200,000 samples need about 110 MB", "use --points 69000", "--memory 111MB"],
+    );
     place.ok(&["sample", "plate.obj", "-o", "plate.ply", "--points", "69000", "--memory", "60MB"]);
 }
 

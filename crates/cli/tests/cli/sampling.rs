@@ -80,7 +80,12 @@ fn samples_that_cannot_be_made_are_refused() {
     let refused = |status: i32, mesh: &str, options: &[&str], words: &[&str]| {
         place.refused(status, &[&["sample", mesh, "-o", "s.ply"], options].concat(), words);
     };
-    refused(2, "ramp.obj", &["--points", "9", "--pattern", "regular"], &["--spacing", "--pattern", "--points"]);
+    refused(
+        2,
+        "ramp.obj",
+        &["--points", "9", "--pattern", "regular"],
+        &["--spacing", "--pattern", "--points"],
+    );
     refused(2, "ramp.obj", &[], &["--spacing", "--points"]);
     refused(2, "ramp.obj", &["--points", "0"], &["--points"]);
     refused(2, "ramp.obj", &["--points", "9", "--pattern", "white"], &["white", "blue-noise"]);

@@ -149,7 +149,8 @@ impl Cells {
                     if of_x + of_y + of_z > 1.0 {
                         continue;
                     }
-                    let key = key([cell[0].wrapping_add(dx), cell[1].wrapping_add(dy), cell[2].wrapping_add(dz)]);
+                    let key =
+                        key([cell[0].wrapping_add(dx), cell[1].wrapping_add(dy), cell[2].wrapping_add(dz)]);
                     let mut i = self.heads[self.bucket(key)];
                     while i != NONE {
                         let entry = &self.entries[i as usize];

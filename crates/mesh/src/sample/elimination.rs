@@ -121,3 +121,51 @@ fn id(i: usize) -> u32 {
 fn whole(n: usize) -> f64 {
     n as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::super::cells::Site;
+    use super::*;
+
+    /// Eliminates one by one, with all weights computed anew from all pairs.
+    fn naive(sites: &[Site], count: u32, reach: f64) -> Vec<[f64; 3]> {
+        let least = 0.65 * reach * (1.0 - (f64::from(count) / whole(sites.len())).powf(1.5));
+        let mut left: Vec<Site> = sites.to_vec();
+        while left.len() > count as usize {
+            let weight = |i: usize| -> f64 {
+                let of = |j: usize| {
+                    let [p, q] = [left[i], left[j]];
+                    let distance = (0..3).map(|k| (p.at[k] - q.at[k]).powi(2)).sum::<f64>().sqrt();
+                    let angle: f32 = (0..3).map(|k| p.normal[k] * q.normal[k]).sum();
+                    let is_near = i != j && distance <= reach && angle >= -0.5;
+                    if is_near { (1.0 - distance.max(least) / reach).powi(8) } else { 0.0 }
+                };
+                (0..left.len()).map(of).sum()
+            };
+            let weights: Vec<f64> = (0..left.len()).map(weight).collect();
+            let most = (0..left.len()).fold(0, |best, i| if weights[i] > weights[best] { i } else { best });
+            left.remove(most);
+        }
+        left.iter().map(|site| site.at).collect()
+    }
+
+    #[test]
+    fn the_same_candidates_remain_as_by_all_pairs() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+        for count in [40, 80, 150] {
+            // Two sheets that face away from each other, nearer than the samples.
+            let mut site = |i: u32| {
+                let up = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
+                Site { at: [rng.random(), rng.random(), 0.001 * f64::from(up)], normal: [0.0, 0.0, up] }
+            };
+            let sites: Vec<Site> = (0..300).map(&mut site).collect();
+            let mut candidates = table(300, count, 2.0);
+            sites.iter().for_each(|site| candidates.add(*site));
+            let expected = naive(&sites, count, candidates.radius());
+            assert_eq!(eliminate(candidates, count), expected);
+        }
+    }
+}
