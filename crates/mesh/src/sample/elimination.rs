@@ -164,7 +164,7 @@ mod tests {
             let sites: Vec<Site> = (0..300).map(&mut site).collect();
             let mut candidates = table(300, count, 2.0);
             sites.iter().for_each(|site| candidates.add(*site));
-            let expected = naive(&sites, count, candidates.radius());
+            let expected = naive(&sites, count, widen(&mut candidates));
             assert_eq!(eliminate(candidates, count), expected);
         }
     }
