@@ -51,8 +51,8 @@ pub enum SamplePattern {
     /// Blue noise: random places none of which is near another (a Poisson-disc distribution).
     ///
     /// At a spacing s, no two samples are nearer than 0.95 s, and about a third fewer samples are
-    /// needed than in rows on large faces. For a number of samples n on an area A, the nearest two are about
-    /// 0.75 √(A/n) apart.
+    /// needed than in rows on large faces. For a number of samples n on an area A, the nearest two
+    /// are about 0.75 √(A/n) apart.
     ///
     /// Surfaces whose normals differ by more than 120°, such as the two sides of a thin sheet, are
     /// sampled independently: these distances hold for samples of the same side, and each side has
