@@ -102,7 +102,7 @@ pub use picture::contact_picture;
 pub use poses::PosesArgs;
 pub use posing::PairArgs;
 pub use preprocess::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, WeightName};
-pub use sample::SampleArgs;
+pub use sample::{PatternName, SampleArgs};
 pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
 pub use slices::{
     AvatarArgs, AvatarBox, BuildArgs, FloorName, PixelArgs, QueryArgs, ReachArgs, ResponseName, RouteArgs,
@@ -160,6 +160,15 @@ const TOUCH_EXAMPLE: &str = "\
 Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} for each shape:
   nearmiss touch room.nm --shapes robot.jsonl --json";
 
+const SAMPLE_EXAMPLES: &str = "\
+Examples:
+  nearmiss sample atrium.obj -o atrium.ply --spacing 0.02
+  nearmiss sample part.stl -o part.ply --points 50000 --seed 7
+  nearmiss sample part.stl -o part.ply --spacing 0.5 --pattern regular
+
+Every place on the surface is within --spacing of a point, in all patterns. In blue noise, points on the same side of \
+a surface are at least 0.95 of the spacing apart, and both sides of a thin sheet get points of their own.";
+
 /// The commands, each with its options. `xtask` flattens them into its own.
 #[derive(Debug, Clone, Subcommand)]
 #[non_exhaustive]
@@ -216,7 +225,7 @@ pub enum Command {
     )]
     Export(ExportArgs),
     /// Sample points on the surface of a mesh
-    #[command(after_long_help = "Example:\n  nearmiss sample atrium.obj -o atrium.ply --spacing 0.02")]
+    #[command(after_long_help = SAMPLE_EXAMPLES)]
     Sample(SampleArgs),
     /// Make and query slice maps: a building as a stack of images, to walk through
     #[command(subcommand)]

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use nearmiss::io::PlyPoints;
-use nearmiss::mesh::{SampleOptions, SampleSize, sample};
+use nearmiss::mesh::{SampleOptions, SamplePattern, SampleSize, sample};
 use serde::Serialize;
 
 use crate::console::{Console, Results, now};
@@ -13,6 +13,28 @@ use crate::error::CliError;
 use crate::estimate::check_sampling;
 use crate::memory::MemoryArgs;
 use crate::{input, output};
+
+/// Names of the patterns of samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PatternName {
+    /// Random places, none of which is near another (Poisson discs)
+    BlueNoise,
+    /// Rows on each triangle; needs --spacing
+    Regular,
+    /// With --spacing, rows with each point moved at random; with --points, independent places
+    Random,
+}
+
+impl PatternName {
+    pub(crate) fn pattern(self) -> SamplePattern {
+        match self {
+            Self::BlueNoise => SamplePattern::BlueNoise,
+            Self::Regular => SamplePattern::Regular,
+            Self::Random => SamplePattern::Random,
+        }
+    }
+}
 
 /// Options of `sample`.
 #[derive(Debug, Clone, Args)]
@@ -26,12 +48,15 @@ pub struct SampleArgs {
     /// Largest distance of any place on the surface from a point, in the units of the mesh
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub spacing: Option<f64>,
-    /// Number of points, drawn at random, uniformly by area
+    /// Number of points, spread uniformly by area
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub points: Option<u32>,
-    /// Seed; with --spacing, it moves points at random instead of leaving them in rows
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
+    /// Arrangement of the points
+    #[arg(long, value_enum, default_value = "blue-noise", value_name = "PATTERN")]
+    pub pattern: PatternName,
+    /// Seed of the random places
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
     /// The memory limit
     #[command(flatten)]
     pub memory: MemoryArgs,
@@ -48,10 +73,19 @@ pub struct SampleArgs {
 struct Report {
     points: usize,
     triangles: usize,
+    pattern: PatternName,
     seconds: f64,
 }
 
 pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
+    let samples = match (args.spacing, args.points) {
+        (Some(spacing), _) => SampleSize::Spacing(spacing),
+        (None, points) => SampleSize::Count(points.unwrap_or(0)),
+    };
+    if let (SampleSize::Count(_), PatternName::Regular) = (samples, args.pattern) {
+        let what = "expected --spacing with --pattern regular, got --points; choose another pattern";
+        return Err(CliError::Usage(what.to_owned()));
+    }
     output::check_apart(&args.output, &[&args.input])?;
     let start = now();
     let console = Console::new(args.quiet);
@@ -60,15 +94,8 @@ pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
     let limit = input::limit_reading(&args.input, None);
     let mesh = nearmiss::io::read_mesh(&args.input, None)?;
     drop(limit);
-    if let Some(spacing) = args.spacing {
-        check_sampling(&args.input, args.memory.limit(), console, &mesh, (spacing, args.seed.is_some()))?;
-    }
-    let samples = match (args.spacing, args.points) {
-        (Some(spacing), _) => SampleSize::Spacing(spacing),
-        (None, points) => SampleSize::Count(points.unwrap_or(0)),
-    };
-    let mut options = SampleOptions::new(samples);
-    options.seed = args.seed;
+    let options = SampleOptions::new(samples).with_pattern(args.pattern.pattern()).with_seed(args.seed);
+    check_sampling(&args.input, args.memory.limit(), console, &mesh, &options)?;
     let points =
         sample(&mesh, &options).map_err(|cause| CliError::Sample { path: args.input.clone(), cause })?;
     output::replace(&args.output, |out| {
@@ -78,6 +105,7 @@ pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
     let report = Report {
         points: points.len(),
         triangles: mesh.triangles().len(),
+        pattern: args.pattern,
         seconds: start.elapsed().as_secs_f64(),
     };
     let mut results = Results::new();

@@ -20,5 +20,5 @@ pub use distance::{TriangleDistance, triangle_distance};
 pub use lattice::{Lattice, lattice_samples};
 pub use meet::triangles_meet;
 pub use nearest::nearest_on_triangle;
-pub use sample::{SampleError, SampleOptions, SampleSize, sample};
+pub use sample::{SampleError, SampleOptions, SamplePattern, SampleSize, sample};
 pub use triangle::Corners;

@@ -31,6 +31,11 @@ impl Triangle {
         Self { corner: a, axes: [along, unit(away, height)], base, foot, height }
     }
 
+    /// Returns the length of the longest side.
+    pub(crate) fn base(&self) -> f64 {
+        self.base
+    }
+
     pub(crate) fn area(&self) -> f64 {
         0.5 * self.base * self.height
     }

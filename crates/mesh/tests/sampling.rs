@@ -2,7 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::TriangleMesh;
-use nearmiss_mesh::{Lattice, SampleError, SampleOptions, SampleSize, lattice_samples, sample};
+use nearmiss_mesh::{
+    Lattice, SampleError, SampleOptions, SamplePattern, SampleSize, lattice_samples, sample,
+};
 
 /// Triangles of many shapes: right, flat, needle-thin, obtuse, tiny, huge, without area, a point.
 const CORNERS: [[[f64; 3]; 3]; 9] = [
@@ -49,10 +51,9 @@ fn off_the_mesh(p: [f64; 3]) -> f64 {
 
 #[test]
 fn no_place_is_further_from_a_sample_than_asked() {
-    for seed in [None, Some(3)] {
+    for pattern in [SamplePattern::Regular, SamplePattern::Random, SamplePattern::BlueNoise] {
         for spacing in [0.5, 0.13] {
-            let mut options = SampleOptions::new(SampleSize::Spacing(spacing));
-            options.seed = seed;
+            let options = SampleOptions::new(SampleSize::Spacing(spacing)).with_pattern(pattern).with_seed(3);
             let points = sample(&mesh(), &options).unwrap();
             let mut farthest = 0.0_f64;
             for corners in CORNERS {
@@ -72,8 +73,9 @@ fn no_place_is_further_from_a_sample_than_asked() {
             assert_eq!(sample(&mesh(), &options).unwrap(), points, "the same again");
         }
     }
-    let rows = sample(&mesh(), &SampleOptions::new(SampleSize::Spacing(0.13))).unwrap();
-    let moved = sample(&mesh(), &SampleOptions::new(SampleSize::Spacing(0.13)).with_seed(1)).unwrap();
+    let options = SampleOptions::new(SampleSize::Spacing(0.13));
+    let rows = sample(&mesh(), &options).unwrap();
+    let moved = sample(&mesh(), &options.with_pattern(SamplePattern::Random)).unwrap();
     assert!(moved.len() < 2 * rows.len(), "{} in rows, {} moved", rows.len(), moved.len());
 }
 
@@ -190,6 +192,8 @@ fn what_cannot_be_sampled_is_refused() {
     assert!(matches!(refused(&mesh(), SampleSize::Spacing(1e-9)), SampleError::TooMany { .. }));
     let flat = TriangleMesh::new(vec![[0.0; 3], [1.0; 3]], vec![[0, 1, 1]]).unwrap();
     assert_eq!(refused(&flat, SampleSize::Count(10)), SampleError::NoArea);
+    let regular = SampleOptions::new(SampleSize::Count(10)).with_pattern(SamplePattern::Regular);
+    assert_eq!(sample(&mesh(), &regular), Err(SampleError::RegularCount));
     assert!(!sample(&flat, &SampleOptions::new(SampleSize::Spacing(0.1))).unwrap().is_empty(), "a line");
     let broken = TriangleMesh::new(vec![[0.0; 3], [1.0, f64::NAN, 0.0]], vec![[0, 1, 1]]).unwrap();
     assert_eq!(refused(&broken, SampleSize::Spacing(0.1)), SampleError::NotFinite { vertex: 1 });

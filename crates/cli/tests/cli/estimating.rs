@@ -64,12 +64,28 @@ fn long_runs_are_announced() {
 fn samples_that_do_not_fit_into_memory_are_refused_before_they_are_made() {
     let place = Place::new();
     place.write("plate.obj", "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nf 1 2 3 4\n");
-    let command = ["sample", "plate.obj", "-o", "plate.ply", "--spacing", "0.1"];
+    let regular = ["--pattern", "regular"];
+    let command = [&["sample", "plate.obj", "-o", "plate.ply", "--spacing", "0.1"], &regular[..]].concat();
     let words =
         ["plate.obj: about 1,", "samples need about 5", "40 MB are allowed", "--spacing 0.1", "--memory 5"];
     place.refused(1, &[&command[..], &["--memory", "40MB"]].concat(), &words);
     place.ok(&[&command[..], &["--memory", "80MB"]].concat());
-    place.ok(&["sample", "plate.obj", "-o", "plate.ply", "--spacing", "0.2", "--memory", "40MB"]);
+    let wider = ["sample", "plate.obj", "-o", "plate.ply", "--spacing", "0.2", "--memory", "40MB"];
+    place.ok(&[&wider[..], &regular].concat());
+
+    let spaced = ["sample", "plate.obj", "-o", "plate.ply", "--spacing", "0.1", "--memory", "60MB"];
+    place.refused(
+        1,
+        &spaced,
+        &["about 770,000 samples need about 86 MB", "use --spacing 0.1", "--memory 90MB"],
+    );
+    let counted = ["sample", "plate.obj", "-o", "plate.ply", "--points", "200000", "--memory", "60MB"];
+    place.refused(
+        1,
+        &counted,
+        &["200,000 samples need about 110 MB", "use --points 69000", "--memory 111MB"],
+    );
+    place.ok(&["sample", "plate.obj", "-o", "plate.ply", "--points", "69000", "--memory", "60MB"]);
 }
 
 /// Writes and prepares a ball in metres, and the same ball in millimetres.

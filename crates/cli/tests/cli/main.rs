@@ -22,5 +22,6 @@ mod paths;
 mod prepare;
 mod routing;
 mod running;
+mod sampling;
 mod slicing;
 mod touching;

@@ -126,18 +126,6 @@ fn meshes_are_sampled_and_the_papers_rule_can_be_asked_for() {
     let built =
         place.ok(&["slices", "build", "ramp.obj", "-o", "ramp", "--pixel", "0.1", "--json"]).json().remove(0);
     assert_eq!((&built["width"], &built["height"]), (&41.into(), &31.into()), "{built}");
-
-    let told =
-        place.ok(&["sample", "ramp.obj", "-o", "ramp.ply", "--spacing", "0.1", "--json"]).json().remove(0);
-    assert_eq!(keys(&told), sorted("points triangles seconds"));
-    let many = told["points"].as_u64().unwrap();
-    assert!((1200..4000).contains(&many), "{told}");
-    place.ok(&["sample", "ramp.obj", "-o", "thousand.ply", "--points", "1000", "--seed", "4"]);
-    let ply = fs::read(place.path("thousand.ply")).unwrap();
-    assert!(String::from_utf8_lossy(&ply[..200]).contains("element vertex 1000\n"));
-    let again = place.ok(&["sample", "ramp.obj", "-o", "again.ply", "--points", "1000", "--seed", "4"]);
-    assert!(again.results.starts_with("1000 points on 2 triangles"), "{}", again.results);
-    assert_eq!(fs::read(place.path("again.ply")).unwrap(), ply);
 }
 
 #[test]
