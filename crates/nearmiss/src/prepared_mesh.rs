@@ -29,7 +29,8 @@ const VERSION: u32 = 1;
 ///
 /// let mesh = Mesh::open(&path, Check::Structure)?;
 /// let moved = Pose::from_translation([0.5, 0.1, 0.1]);
-/// let answer = MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(&moved)).collide(&mut MeshScratch::default());
+/// let pair = MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(&moved));
+/// let answer = pair.collide(&mut MeshScratch::default());
 /// assert!(answer.verdict.is_intersecting());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

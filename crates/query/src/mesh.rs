@@ -8,6 +8,7 @@ pub(crate) mod mesh_pair;
 pub(crate) mod odds;
 pub(crate) mod pair;
 pub(crate) mod placed;
+pub(crate) mod quality;
 pub(crate) mod region;
 pub(crate) mod time_critical;
 pub(crate) mod triangle_pairs;

@@ -137,6 +137,7 @@ struct Placing {
 }
 
 /// Measures both methods at random poses of the object in the scan.
+#[expect(clippy::too_many_lines, reason = "one table, row by row")]
 fn place(subject: &Subject, object: &Object, body: &Object, options: &Options) -> Result<(), Failure> {
     let half = object.cloud.bounds().half_extents();
     let diagonal = 2.0 * half.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -49,7 +49,7 @@ impl Moments {
 
     /// The principal axes, the longest first; `None` without area.
     fn axes(&self) -> Option<[[f32; 3]; 3]> {
-        if !(self.area > 0.0) {
+        if self.area.is_nan() || self.area <= 0.0 {
             return None;
         }
         let mean = self.first.map(|x| x / self.area);

@@ -1,5 +1,5 @@
 //! Temporal coherence: the result of a query about two scans speeds up the next query after a small
-//! relative_pose.
+//! motion.
 //!
 //! Scans that met probably still meet, so the two points whose discs crossed are tested first, then
 //! their leaves. Scans that were separated and move slowly keep the pruned node pairs of the last
@@ -107,8 +107,8 @@ impl PairHint {
     }
 }
 
-/// An upper bound on how far the relative_pose between two poses moves any point of b.
-fn relative_pose(pair: &ScanPair<'_>, from: &Pose, to: &Pose) -> f64 {
+/// An upper bound on how far the motion between two poses moves any point of b.
+fn motion(pair: &ScanPair<'_>, from: &Pose, to: &Pose) -> f64 {
     let Ball { centre, radius } = pair.b.outline.surface;
     let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
     let turn = (to.rotation() * to.scale() - from.rotation() * from.scale()).norm();
@@ -135,7 +135,7 @@ impl Known {
     /// Records that b is at `pose`. If the travel is too long or NaN, everything but the question
     /// is forgotten.
     pub(crate) fn come_to(&mut self, pose: Pose, pair: &ScanPair<'_>) {
-        self.step = self.pose.map_or(f64::MAX, |from| relative_pose(pair, &from, &pose));
+        self.step = self.pose.map_or(f64::MAX, |from| motion(pair, &from, &pose));
         self.pose = Some(pose);
         // Rounded up so that no step is lost.
         let travel = if self.step > 0.0 { (self.travel + self.step).next_up() } else { self.travel };

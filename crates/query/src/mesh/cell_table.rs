@@ -5,7 +5,7 @@
 //! b `filled_b`. If every placement of these cells among the s is equally likely, the number c of
 //! cells that both fill is hypergeometric:
 //!
-//! Pr[c ≥ x] = 1 − Σ_{t < x} C(s_a, t) C(s − s_a, s_b − t) / C(s, s_b).
+//! `Pr[c ≥ x] = 1 − Σ_{t < x} C(s_a, t) C(s − s_a, s_b − t) / C(s, s_b)`.
 //!
 //! Smooth sheets that are near and parallel are not placed independently. The probability therefore
 //! orders pairs of nodes and never prunes one.
@@ -123,7 +123,7 @@ mod tests {
     fn more_filled_cells_make_a_collision_likelier() {
         for shared in [1, 2, 10, MOST_SHARED] {
             let table = CellTable::new(shared);
-            for a in 0..CELLS as u16 {
+            for a in 0..u16::from(nearmiss_hierarchy::CELLS) {
                 for step in 0..40_u8 {
                     let (b, a) = (f32::from(step) * 1.6, f32::from(a));
                     let own = table.fewer([a, b]);

@@ -1,4 +1,4 @@
-//! Whether two meshes meet, and all their contacts.
+//! Exact collision of two meshes: one contact, or all.
 
 use std::ops::ControlFlow;
 

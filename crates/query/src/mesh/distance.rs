@@ -79,7 +79,7 @@ impl PairVisitor<Nearness> for Search<'_, '_> {
 
     fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open<Nearness>) -> ControlFlow<()> {
         let bounds = self.pair.least_distances(leaves);
-        let to_world = f64::from(self.pair.meshes[0].stored_to_world().scale());
+        let to_world = self.pair.meshes[0].stored_to_world().scale();
         let mut open = self.pair.lanes(leaves);
         // The least bound first: the others may then be out of reach.
         while let Some(lane) = Bits(open).min_by(|&i, &j| bounds[i].total_cmp(&bounds[j])) {

@@ -94,7 +94,7 @@ impl<'a> MeshPairing<'a> {
     /// The lanes in use by the triangle pairs of two leaves, as bits.
     pub(crate) fn lanes(&self, [a, b]: [usize; 2]) -> u32 {
         let count = |mesh: &MeshView<'_>, leaf: usize| mesh.tree.topology().points_of_leaf(leaf).len();
-        let (a, b) = (count(&self.a, a), count(&self.b, b));
+        let (a, b) = (count(self.a, a), count(self.b, b));
         ((1 << a) - 1) * (0x1111 & ((1 << (4 * b)) - 1))
     }
 

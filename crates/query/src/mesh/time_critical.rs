@@ -17,7 +17,7 @@ use crate::mesh::answer::{MeshAnswer, MeshVerdict};
 use crate::mesh::cell_table::CellTable;
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::odds::{Odds, OddsVisitor};
-use crate::mesh::pair::MeshQuality;
+use crate::mesh::quality::MeshQuality;
 use crate::mesh::region::region;
 
 struct Search<'a> {

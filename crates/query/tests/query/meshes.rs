@@ -51,34 +51,33 @@ fn check(meshes: &[TriangleMesh; 2], poses: &[Pose; 2]) -> bool {
         let scratch = &mut MeshScratch::by_level(level);
         let answer = pair.collide(scratch);
         assert_eq!(answer.verdict.is_intersecting(), !expected.is_empty(), "{poses:?}");
-        assert_eq!(answer.verdict.is_separated(), expected.is_empty());
+        assert_eq!(answer.verdict.is_separated(), expected.is_empty(), "{answer:?}");
         let mut contacts = Vec::new();
         let (all, complete) = pair.contacts(&mut contacts, scratch);
         let mut found: Vec<_> = contacts.iter().map(|contact| contact.triangles).collect();
         found.sort_unstable();
         assert!(complete && found == expected, "{found:?}, expected {expected:?}");
-        assert_eq!(all.verdict.is_intersecting(), !expected.is_empty());
+        assert_eq!(all.verdict.is_intersecting(), !expected.is_empty(), "{all:?}");
         let distance = pair.distance(scratch);
-        assert!(distance.complete && distance.lower == distance.upper);
+        assert!(distance.complete && distance.lower == distance.upper, "{distance:?}");
         assert!((distance.upper - least).abs() <= 1e-9 * least, "{distance:?}, expected {least}");
         let length = (0..3).map(|k| (distance.points[1][k] - distance.points[0][k]).powi(2)).sum::<f64>();
         let far: f64 = distance.points.iter().flatten().map(|x| x.abs()).sum();
         assert!((length.sqrt() - least).abs() <= 1e-9 * least + 1e-13 * far, "{distance:?}");
         for _ in 0..2 {
-            assert_eq!(
-                pair.collide_hinted(&mut hint, scratch).verdict.is_intersecting(),
-                !expected.is_empty()
-            );
-            assert_eq!(pair.distance_hinted(&mut hint, scratch).upper, distance.upper);
+            let hinted = pair.collide_hinted(&mut hint, scratch);
+            assert_eq!(hinted.verdict.is_intersecting(), !expected.is_empty(), "{hinted:?}");
+            assert_eq!(pair.distance_hinted(&mut hint, scratch).upper, distance.upper, "with a hint");
         }
         // Under any budget the bounds hold, and a verdict is right.
         for work in [0, 1, 20, 100] {
             let pair = pair.within(&Budget::UNLIMITED.with_work(work));
             let distance = pair.distance(scratch);
-            assert!(distance.lower <= least * (1.0 + 1e-9) && distance.upper >= least * (1.0 - 1e-9));
+            assert!(distance.lower <= least * (1.0 + 1e-9), "{distance:?}, expected {least}");
+            assert!(distance.upper >= least * (1.0 - 1e-9), "{distance:?}, expected {least}");
             let verdict = pair.collide(scratch).verdict;
-            assert!(!verdict.is_intersecting() || !expected.is_empty());
-            assert!(!verdict.is_separated() || expected.is_empty());
+            assert!(!verdict.is_intersecting() || !expected.is_empty(), "{work} units: {verdict:?}");
+            assert!(!verdict.is_separated() || expected.is_empty(), "{work} units: {verdict:?}");
         }
     }
     !expected.is_empty()
