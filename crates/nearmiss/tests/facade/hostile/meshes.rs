@@ -181,7 +181,7 @@ fn fill(bytes: &mut [u8], tag: [u8; 4], value: &[u8]) {
     }
 }
 
-const TAGS: [[u8; 4]; 5] = [*b"TREE", *b"LEAF", *b"VERT", *b"TRIS", *b"SRCE"];
+const TAGS: [[u8; 4]; 6] = [*b"TREE", *b"LEAF", *b"VERT", *b"TRIS", *b"SRCE", *b"CELL"];
 
 #[test]
 fn absurd_numbers_in_a_mesh_do_not_panic() {
@@ -265,12 +265,13 @@ fn lengths_that_contradict_each_other_are_refused() {
         writer.section(TAGS[2], 0, shorter(arrays.vertices, cut == 2)).unwrap();
         writer.section(TAGS[3], 0, shorter(arrays.triangles, cut == 3)).unwrap();
         writer.section(TAGS[4], 0, shorter(arrays.source, cut == 4)).unwrap();
+        writer.section(TAGS[5], 0, shorter(arrays.cells, cut == 5)).unwrap();
         let mut bytes = Vec::new();
         writer.write_to(&mut bytes).unwrap();
         bytes
     };
-    assert!(without(5) == bytes_of(&mesh), "nothing is cut");
-    for (cut, name) in [(0, "boxes"), (1, "leaves"), (3, ""), (4, "source")] {
+    assert!(without(6) == bytes_of(&mesh), "nothing is cut");
+    for (cut, name) in [(0, "boxes"), (1, "leaves"), (3, ""), (4, "source"), (5, "cells")] {
         for check in [Check::Structure, Check::Full] {
             let refused = Mesh::from_bytes(without(cut), check).unwrap_err();
             assert!(matches!(refused, LoadError::Flaw(_)), "{cut}: {refused}");
@@ -289,6 +290,7 @@ fn lengths_that_contradict_each_other_are_refused() {
     writer.section(TAGS[2], 0, arrays.vertices).unwrap();
     writer.section(TAGS[3], 0, &arrays.triangles[..0]).unwrap();
     writer.section(TAGS[4], 0, &arrays.source[..0]).unwrap();
+    writer.section(TAGS[5], 0, &arrays.cells[..0]).unwrap();
     let mut empty = Vec::new();
     writer.write_to(&mut empty).unwrap();
     let refused = Mesh::from_bytes(empty, Check::Structure).unwrap_err().to_string();
