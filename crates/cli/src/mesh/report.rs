@@ -100,7 +100,6 @@ pub(crate) struct MeshAnswerReport {
     /// The likelihood of contact.
     probability: Option<f64>,
     /// The place where a contact is likeliest, if undecided.
-    #[serde(skip_serializing_if = "Option::is_none")]
     region: Option<ContactRegion>,
     /// The triangles that meet at the witness.
     triangles: Option<[u32; 2]>,

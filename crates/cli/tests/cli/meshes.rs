@@ -8,8 +8,8 @@ use serde_json::Value;
 use crate::running::{Place, keys, name, numbers, shift, sorted};
 
 const FIELDS: &str = "verdict evidence reason witness normal_a normal_b residual source_a source_b gap \
-                      distance_estimate band likelihood probability triangles evaluations node_pairs leaf_pairs \
-                      micros";
+                      distance_estimate band likelihood probability region triangles evaluations node_pairs \
+                      leaf_pairs micros";
 
 /// The faces of a cube with edges of length 2 about the origin, as OBJ with corners that repeat, and
 /// with a triangle that is there twice and one without area.
@@ -171,14 +171,18 @@ fn every_verdict_about_meshes_has_all_fields() {
 
     let short = ask(&["--pose-b", &shift(1.5, 0.3, 0.2), "--work", "0"]);
     assert_eq!((&short["verdict"], &short["reason"]), (&"undecided".into(), &"budget".into()));
-    assert!(short["probability"].is_null() && short["evidence"].is_null(), "{short}");
+    assert!(short["probability"] == 0.5 && short["evidence"].is_null(), "{short}");
+    assert!(numbers(&short["region"]["centre"]).len() == 3 && hit["region"].is_null(), "{short}");
+    let likely = ask(&["--pose-b", &shift(0.5, 0.3, 0.2), "--p-min", "0.0001", "--k-min", "1"]);
+    assert_eq!(likely["verdict"], "undecided");
+    assert!((0.0..=1.0).contains(&likely["probability"].as_f64().unwrap()), "{likely}");
     let words =
         |options: &[&str]| place.ok(&[&["mesh-collide", "cube.nm", "cube.nm"], options].concat()).results;
     assert!(words(&["--pose-b", &shift(1.5, 0.3, 0.2)]).starts_with("They touch at ("));
     let apart = words(&["--pose-b", &shift(3.0, 0.0, 0.0)]);
     assert!(apart.starts_with("No contact; 1.00000 apart (certified).\n"), "{apart}");
     assert!(words(&["--pose-b", &shift(9.0, 0.0, 0.0)]).contains("hint: the bounding boxes are 7 apart"));
-    assert!(words(&["--budget", "0us"]).starts_with("Cannot tell: the budget ran out"));
+    assert!(words(&["--budget", "0us"]).starts_with("Undecided: they touch with a probability of "));
 
     // The same from a raw file, and by the option of collide.
     for asked in [

@@ -117,7 +117,9 @@ pub(crate) fn collide<'a>(
                 open.select_nth_unstable_by(most - 1, order);
                 open[..most].sort_unstable_by(order);
             }
-            let likelihood = likelihood(open);
+            // Before the first comparison nothing is known.
+            let is_compared = search.pair.meter.spent.node_pairs > 0;
+            let likelihood = if is_compared { likelihood(open) } else { 0.5 };
             let best = open.first().map_or(NodePair::ROOTS, |open| open.pair);
             (MeshVerdict::Undecided(region(&search.pair, best)), likelihood)
         }
