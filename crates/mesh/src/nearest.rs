@@ -14,7 +14,8 @@ use crate::triangle::{Corners, between, dot, length};
 /// use nearmiss_mesh::nearest_on_triangle;
 ///
 /// let floor = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-/// assert_eq!(nearest_on_triangle(&floor, [0.25, 0.25, 3.0]), [0.25, 0.25, 0.0]);
+/// let [x, y, z] = nearest_on_triangle(&floor, [0.25, 0.125, 3.0]);
+/// assert!((x - 0.25).abs() < 1e-14 && (y - 0.125).abs() < 1e-14 && z == 0.0);
 /// assert_eq!(nearest_on_triangle(&floor, [2.0, -1.0, 0.5]), [1.0, 0.0, 0.0]);
 /// ```
 #[must_use]

@@ -2,7 +2,7 @@
 //! average-case collision detection, 2003).
 //!
 //! The search keeps the pairs of nodes in a queue by the probability that their surfaces collide
-//! ([`CellTable`](crate::mesh::cell_table::CellTable)). It reports a collision as soon as `k_min`
+//! ([`CellTable`]). It reports a collision as soon as `k_min`
 //! pairs have reached the probability `p_min`. Bounding volumes alone prune pairs, so a separation
 //! is exact; and pairs of leaves are decided exactly. Stopped by these two, a search therefore errs
 //! by false hits only. A budget may stop it too.
