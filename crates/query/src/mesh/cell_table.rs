@@ -26,7 +26,7 @@ pub(crate) fn expected([a, b]: [f32; 2]) -> f32 {
     a * b * (1.0 / CELLS as f32)
 }
 
-/// Pr[c < x] for every pair of counts. The complement keeps its precision where a collision is all
+/// `Pr[c < x]` for every pair of counts. The complement keeps its precision where a collision is all
 /// but certain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CellTable {
@@ -65,7 +65,7 @@ impl CellTable {
         self.shared
     }
 
-    /// Pr[c < x] for two counts of 0 to s, interpolated between whole counts.
+    /// `Pr[c < x]` for two counts of 0 to s, interpolated between whole counts.
     #[inline]
     pub(crate) fn fewer(&self, filled: [f32; 2]) -> f32 {
         #[expect(clippy::cast_precision_loss, reason = "at most 64")]
