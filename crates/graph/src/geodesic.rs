@@ -71,7 +71,7 @@ impl GeodesicScratch {
     }
 
     /// Returns the distance as [`Self::distance`] does, and sets `path` to the points of a shortest
-    /// path from `a` to `b`, both included. `path` is empty if there is none.
+    /// path from `a` to `b`, both included. `path` is empty if `b` cannot be reached.
     ///
     /// # Panics
     /// Panics if `a` or `b` is not a point.

@@ -173,7 +173,7 @@ impl LazyPath {
         true
     }
 
-    /// Continues on one level by a shortest path. Returns `false` if there is none.
+    /// Continues on one level by a shortest path. Returns `false` if no path exists.
     fn search_level(
         &mut self,
         levels: &Levels,

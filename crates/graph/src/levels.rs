@@ -448,7 +448,7 @@ impl Levels {
     }
 
     /// Returns the length of a path as [`Self::distance`] does, and sets `path` to its points from
-    /// `a` to `b`, both included. `path` is empty if there is none.
+    /// `a` to `b`, both included. `path` is empty if `b` cannot be reached.
     ///
     /// # Panics
     /// Panics if `a` or `b` is not a point.

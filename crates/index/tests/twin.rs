@@ -130,7 +130,7 @@ fn overlapping_points_are_those_of_an_exhaustive_search() {
         |i| if i.is_multiple_of(97) { 3.0 } else { 0.01 },
         "a few whose balls overlap all others",
     );
-    compare_overlaps(&points, |_| 0.0, "nobody");
+    compare_overlaps(&points, |_| 0.0, "no point is found");
 }
 
 fn compare_cones(points: &[Point], tips: &[f32], own: &[f32], slope: f32, what: &str) {

@@ -114,7 +114,7 @@ impl Avatar {
     }
 
     /// Finds the place nearest to `near`, in the caller's coordinates, where the avatar can stand;
-    /// `None` if there is none.
+    /// `None` if the map has no such place.
     ///
     /// Searches all heights of `near` itself and of the places of a [`StepGrid`] ring by ring,
     /// until no further ring can be nearer. The spacing of the places is a pixel; for bases wider

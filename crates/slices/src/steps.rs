@@ -49,7 +49,7 @@ pub(crate) struct Edge {
     pub(crate) is_new: bool,
 }
 
-/// The graph, as far as it is explored.
+/// The explored part of the graph.
 #[derive(Debug)]
 pub(crate) struct Steps<'a> {
     map: &'a SliceMap,

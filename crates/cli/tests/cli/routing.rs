@@ -32,7 +32,7 @@ fn a_place_to_start_serves() {
     }
     let people = place.ok(&["slices", "start", "house", "--near", "9,6.5,0.1"]).results;
     assert!(people.starts_with("Nearest place to stand: [") && people.ends_with(" away.\n"), "{people}");
-    // What people read serves as well.
+    // Places are accepted in the form in which they are printed.
     let spot = people.split(['[', ']']).nth(1).unwrap();
     for spot in [spot.replace(' ', ""), spot.to_owned(), format!("[{spot}]"), format!("({spot})")] {
         told(&place, &["reach", "house", "--start", &spot]);

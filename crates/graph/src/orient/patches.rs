@@ -129,7 +129,7 @@ impl Tree {
     /// component.
     ///
     /// Starts with the signs from joining. Patches are then visited in turn, and a patch that the
-    /// sum of all its `votes` contradicts is reversed, until there is none. Each reversal increases
+    /// sum of all its `votes` contradicts is reversed, until no such patch is left. Each reversal increases
     /// the weight of the votes that are satisfied, so the process terminates.
     pub(super) fn settle(&mut self, votes: &[Votes]) -> Vec<bool> {
         let mut turned: Vec<bool> = (0..id32(self.above.len())).map(|i| self.root(i).turned).collect();

@@ -30,7 +30,7 @@ pub(crate) struct DiscBlock {
     ball: [f32; WIDTH],
 }
 
-/// The discs of all points, and the radii of their balls, zero where there is none.
+/// The discs of all points, and the radii of their balls; 0 for points without a ball.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Discs<'a> {
     pub(crate) normals: &'a [[f32; 3]],

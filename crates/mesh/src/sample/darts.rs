@@ -1,4 +1,4 @@
-//! Poisson-disc samples at a spacing: darts at random, then in the gaps until there are none.
+//! Poisson-disc samples at a spacing: random darts first, then darts in the remaining gaps.
 //!
 //! A dart is rejected if it is within the least distance of a sample. Random darts place most
 //! samples. Each triangle is then halved along its longest side until every part is within the ball
