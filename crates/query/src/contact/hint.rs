@@ -5,7 +5,7 @@
 //! their leaves. Scans that were separated and move slowly keep the pruned node pairs of the last
 //! query as a frontier. A pair with gap g stays disjoint until b has travelled the distance g. So
 //! only pairs whose gap has been used up are compared again, and split if they are no longer
-//! disjoint; while none overlap, nothing is compared. Travel is the length of b's path in a's
+//! disjoint; while no gap is used up, nothing is compared. Travel is the length of b's path in a's
 //! frame, at the point that moves most.
 
 use std::ops::ControlFlow;
