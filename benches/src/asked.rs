@@ -77,7 +77,7 @@ impl Asking {
         if let Some(surfels) = by_radius.or(self.surfels.map(SurfelSize::Count)) {
             interpolation = interpolation.with_surfels(surfels);
         }
-        let options = CollideOptions::default()
+        let options = CollideOptions::estimated()
             .with_detail(if self.witness { Detail::Witness } else { Detail::Verdict })
             .with_evidence(if self.certified { Evidence::Certified } else { Evidence::Estimated })
             .with_method(match self.method {

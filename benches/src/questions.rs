@@ -34,7 +34,7 @@ pub fn asked(
 ) -> Result<Vec<Asked>, Failure> {
     let mut poses: Vec<Pose> = poses::near(object, near, seed)?.iter().map(|near| near.pose).collect();
     poses.extend(poses::sweep(swept, seed, 0).into_iter().flatten());
-    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict);
     let mut judge: Box<dyn Method + '_> = match &object.mesh {
         Some(mesh) => Box::new(MeshTree::new(mesh)),
         None => Box::new(Ours::new(scan, &options)?),
@@ -70,7 +70,7 @@ pub fn in_room([room, body]: [&Scan; 2], scale: f64, near: usize, seed: u64) -> 
         let from = turned.apply(centre);
         poses.push(turned.with_translation([0, 1, 2].map(|k| to[k] - from[k])));
     }
-    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict);
     let mut judge = Ours::of([room, body], &options)?;
     let judged = |pose| Asked { pose, meets: judge.ask(&Pose::IDENTITY, &pose).hit };
     Ok(poses.into_iter().map(judged).collect())

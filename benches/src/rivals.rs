@@ -48,7 +48,7 @@ pub fn rival(name: &str, object: &Object) -> Result<Option<Box<dyn Method>>, Fai
 pub fn bench(object: &Object, mut measure: impl FnMut(&mut dyn Method)) -> Result<(), Failure> {
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     for detail in [Detail::Verdict, Detail::Witness] {
-        measure(&mut ours::Ours::new(&scan, &CollideOptions::default().with_detail(detail))?);
+        measure(&mut ours::Ours::new(&scan, &CollideOptions::estimated().with_detail(detail))?);
     }
     for name in ["parry", "kiddo"] {
         if let Some(mut rival) = rival(name, object)? {

@@ -24,7 +24,7 @@ const POSES: usize = 300;
 
 /// The plans of the queries, with their budgets.
 fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
-    let options = CollideOptions::default();
+    let options = CollideOptions::estimated();
     let [verdict, witness] = [Detail::Verdict, Detail::Witness].map(|detail| options.with_detail(detail));
     let thick = options.with_semantics(Semantics::Thickened(0.5 * r));
     let whole = Budget::UNLIMITED;
@@ -99,7 +99,7 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     }
 
     let plan = CurvePlan::new(&CurveOptions::default(), &scan, &scan).unwrap();
-    let options = CollideOptions::default();
+    let options = CollideOptions::estimated();
     let everything = CollidePlan::new(&options, &scan, &scan).unwrap();
     let (mut found, mut contacts) = (Curves::default(), Contacts::default());
     let mut draw_all = || {

@@ -27,7 +27,7 @@ fn calls(work: impl FnOnce()) -> usize {
 fn warm_batches_and_broad_phases_allocate_nothing() {
     let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
     let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
-    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let options = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
     let sweep: Vec<Pose> = poses::sweep(30, 1, 0).into_iter().flatten().collect();
     let poses: Vec<[Pose; 2]> = sweep.iter().map(|&b| [Pose::IDENTITY, b]).collect();

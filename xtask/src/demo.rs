@@ -43,7 +43,7 @@ pub(crate) fn run() -> Outcome {
         "offset", "verdict", "evidence", "nearest", "gap", "residual", "µs", "evaluations", "node pairs"
     );
     let mut scratch = Scratch::default();
-    let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+    let certified = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&certified, &scan, &scan)?;
     let a = scan.at(&Pose::IDENTITY);
     // Warm up: the first query allocates memory.
@@ -105,7 +105,7 @@ fn least_distance(scan: &Scan, a: &Placed<'_>, b: &Placed<'_>, scratch: &mut Scr
     let (mut apart, mut touching) = (0.0, 20.0 * scan.sampling_radius());
     for _ in 0..16 {
         let radius = 0.5 * (apart + touching);
-        let balls = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
+        let balls = CollideOptions::estimated().with_semantics(Semantics::Thickened(radius));
         let plan = CollidePlan::new(&balls, scan, scan)?;
         if Pair::new(*a, *b).collide(&plan, scratch).verdict.is_intersecting() {
             touching = radius;
@@ -119,7 +119,7 @@ fn least_distance(scan: &Scan, a: &Placed<'_>, b: &Placed<'_>, scratch: &mut Scr
 /// Returns the distance at which the points, not the surfaces, first come within r of each other,
 /// by bisection from far away with the exact query for thickened points.
 fn first_touch(scan: &Scan) -> Outcome<f64> {
-    let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
+    let balls = CollideOptions::estimated().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
     let plan = CollidePlan::new(&balls, scan, scan)?;
     let mut scratch = Scratch::default();
     let mut touches = |distance: f64| {

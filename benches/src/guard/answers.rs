@@ -242,8 +242,8 @@ impl Asker {
         let views = [a.at(&question.poses[0]), b.at(&question.poses[1])];
         let found = self.distance(&views)?;
         let evidence = if a.metric() == Metric::Geodesic { Evidence::Estimated } else { Evidence::Certified };
-        let certified = CollideOptions::default().with_evidence(evidence);
-        let quick = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(Evidence::Estimated);
+        let certified = CollideOptions::estimated().with_evidence(evidence);
+        let quick = CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(Evidence::Estimated);
         let balls = Semantics::Thickened(0.5 * found.band);
         let sure = self.collide(&views, &certified)?;
         let gap = if let Verdict::Separated { gap, .. } = sure { gap } else { 0.0 };

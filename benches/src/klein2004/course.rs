@@ -224,7 +224,7 @@ mod tests {
         assert!(pairs().all(|(&hit, &close)| close || !hit), "a hit with boxes apart");
         assert!(pairs().any(|(&hit, &close)| close && !hit), "boxes meet, meshes do not");
 
-        let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
+        let plan = CollidePlan::new(&CollideOptions::estimated(), &scan, &scan).unwrap();
         let a = scan.at(&Pose::IDENTITY);
         let course = Course::run(&questions, 2, |pose| {
             Pair::new(a, scan.at(pose)).collide(&plan, &mut Scratch::default())

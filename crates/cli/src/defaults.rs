@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use nearmiss::{
-    BuildOptions, ClashOptions, CollideOptions, CurveOptions, DistanceOptions, Evidence, GraphOptions,
+    BuildOptions, ClashOptions, CollideOptions, CurveOptions, DistanceOptions, GraphOptions,
     PointCloud, Scan,
 };
 
@@ -23,9 +23,7 @@ fn defaults_of_the_command_line_are_those_of_the_library() {
     let Command::Preprocess(args) = command("nearmiss preprocess a.ply -o a.nm --graph") else { panic!() };
     assert_eq!(preprocess::graph_options(&args), Some((GraphOptions::default(), None)));
     let Command::Collide(args) = command("nearmiss collide a.nm b.nm") else { panic!() };
-    // The one difference: a person wants proofs, which the library makes only if asked to.
-    let expected = CollideOptions::default().with_evidence(Evidence::Certified);
-    assert_eq!(collide::options(&args, &scan).unwrap(), expected);
+    assert_eq!(collide::options(&args, &scan).unwrap(), CollideOptions::default());
     let Command::Distance(args) = command("nearmiss distance a.nm b.nm") else { panic!() };
     assert_eq!(distance::options(&args, &scan), DistanceOptions::default());
     let Command::Curve(args) = command("nearmiss curve a.nm b.nm -o c.ply") else { panic!() };

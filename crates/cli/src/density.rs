@@ -205,7 +205,7 @@ impl Tests<'_> {
     }
 
     fn verdicts(&self, method: Method) -> Result<Vec<bool>, CliError> {
-        let options = CollideOptions::default().with_detail(Detail::Verdict).with_method(method);
+        let options = CollideOptions::estimated().with_detail(Detail::Verdict).with_method(method);
         let plan = CollidePlan::new(&options, self.scan, self.scan)?;
         let ask = |scratch: &mut Scratch, pose: &Pose| {
             let views = [self.scan.at(self.base), self.scan.at(pose)];

@@ -26,7 +26,7 @@ impl NoCurve {
     pub(crate) fn ask([a, b]: [&Placed<'_>; 2], budget: &Budget) -> Result<Self, PlanError> {
         let mut scratch = Scratch::default();
         let mut ask = |semantics| {
-            let options = CollideOptions::default()
+            let options = CollideOptions::estimated()
                 .with_semantics(semantics)
                 .with_detail(Detail::Witness)
                 .with_evidence(Evidence::Certified);

@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Ok(Scan::build(&nearmiss::io::read(path, None)?.cloud, &BuildOptions::default())?)
     };
     let (a, b) = (build(&first)?, build(&second)?);
-    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&options, &a, &b)?;
 
     // Keep these from frame to frame, so that queries do not allocate.

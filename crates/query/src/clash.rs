@@ -103,7 +103,7 @@ impl ClashPlan {
         if let Some(link) = options.link.filter(|&link| !(link >= 0.0 && link.is_finite())) {
             return Err(PlanError::Link(link));
         }
-        let asked = CollideOptions { metric: options.metric, ..CollideOptions::default() }
+        let asked = CollideOptions { metric: options.metric, ..CollideOptions::estimated() }
             .with_semantics(options.semantics)
             .with_detail(Detail::Verdict)
             .with_evidence(Evidence::Estimated);

@@ -81,7 +81,7 @@ impl CurvePlan {
         if let Some(length) = given.into_iter().find(|&l| !(l > 0.0 && l.is_finite())) {
             return Err(PlanError::CurveLength(length));
         }
-        let contacts = CollideOptions::default()
+        let contacts = CollideOptions::estimated()
             // Balls about points have no curves.
             .with_semantics(Semantics::Surface)
             .with_detail(Detail::Verdict)

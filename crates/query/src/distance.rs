@@ -88,7 +88,7 @@ impl DistancePlan {
         if !(0.0..1.0).contains(&options.relative) {
             return Err(PlanError::Relative(options.relative));
         }
-        let asked = CollideOptions { metric: options.metric, ..CollideOptions::default() }
+        let asked = CollideOptions { metric: options.metric, ..CollideOptions::estimated() }
             .with_semantics(options.semantics)
             .with_detail(Detail::Witness);
         let touching = CollidePlan::new(&asked, a, b)?;

@@ -65,7 +65,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}", machine::description());
     let object = Object::read(&options.object)?.scaled()?;
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
-    let plan = CollidePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan, &scan)?;
+    let plan = CollidePlan::new(&CollideOptions::estimated().with_detail(Detail::Verdict), &scan, &scan)?;
     many_poses(&object.name, &scan, &plan, options)?;
     deadlines(&scan, &plan);
     world(&object.name, &scan, &plan, options)

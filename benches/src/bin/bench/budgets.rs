@@ -75,7 +75,7 @@ fn table(
         let limits = budget.map_or_else(Limits::default, &limits);
         let (mut cells, mut times) = (Vec::new(), Vec::new());
         for (_, order) in ORDERS {
-            let options = CollideOptions::default().with_detail(Detail::Verdict).with_order(order);
+            let options = CollideOptions::estimated().with_detail(Detail::Verdict).with_order(order);
             let mut ours = Ours::new(scan, &options)?.with_limits(limits);
             let (mut wrong, mut total) = (0, 0.0);
             for asked in questions {

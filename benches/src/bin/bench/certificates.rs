@@ -88,7 +88,7 @@ fn one_family(name: &str, form: Form, count: usize, seed: u64, rows: &mut [Row])
     let (shape, ball) = (sample(form, 1200), sample(sphere(BALL), 300));
     let r = scorer_radius(&shape.points).max(scorer_radius(&ball.points));
     let (a, b) = (scan(&shape)?, scan(&ball)?);
-    let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(Evidence::Certified);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&options, &a, &b)?;
     let mut scratch = Scratch::default();
     let (mut bad, mut greatest) = (0, f64::NEG_INFINITY);

@@ -106,7 +106,7 @@ impl Found {
         let (a, b) = (build(room)?, build(body)?);
         let tree = PointScan::new(&room.cloud, f64::INFINITY)?;
         let plan = DistancePlan::new(&DistanceOptions::default(), &a, &b)?;
-        let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+        let certified = CollideOptions::estimated().with_evidence(Evidence::Certified);
         let asked = CollidePlan::new(&certified, &a, &b)?;
         let (mut apart, mut scratch) = (Scratch::default(), Scratch::default());
         let (mut hint, mut found) = (PairHint::default(), Self::default());

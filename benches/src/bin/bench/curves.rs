@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn measure(pair: &str, [a, b]: &[Placed<'_>; 2], passes: u32) -> Result<(), Failure> {
     let radius = |view: &Placed<'_>| view.sampling_radius();
     let r = radius(a).min(radius(b));
-    let options = CollideOptions::default()
+    let options = CollideOptions::estimated()
         .with_detail(Detail::Verdict)
         .with_evidence(Evidence::Estimated)
         .with_order(Order::DepthFirst);

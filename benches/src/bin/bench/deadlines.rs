@@ -47,14 +47,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     println!("{}, poses near contact, {queries} queries a row\n", object.name);
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let poses: Vec<Pose> = poses::near(&object, 500, seed)?.iter().map(|near| near.pose).collect();
-    let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+    let certified = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let sampling = Method::Sampling(Sampling::default().with_test_points(1024));
     let margin = 8.0 * object.r;
     let asked = [
         ("traversal, certified, witness", certified),
         ("the same with a margin of 8 r", certified.with_margin(margin)),
-        ("sampling", CollideOptions::default().with_method(sampling)),
-        ("flat sampling", CollideOptions::default().with_method(flat(sampling))),
+        ("sampling", CollideOptions::estimated().with_method(sampling)),
+        ("flat sampling", CollideOptions::estimated().with_method(flat(sampling))),
         ("order by sides", certified.with_order(Order::Sides)),
     ];
     println!(

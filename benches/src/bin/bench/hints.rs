@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             " --: |".repeat(9)
         );
         for evidence in [Evidence::Estimated, Evidence::Certified] {
-            let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(evidence);
+            let options = CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(evidence);
             let plan = CollidePlan::new(&options, &scan, &scan)?;
             for step in STEPS {
                 let mut walked = Walked::default();

@@ -84,7 +84,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
 
 /// The options of a verdict, a witness and a certificate.
 fn plans() -> [CollideOptions; 3] {
-    let options = CollideOptions::default();
+    let options = CollideOptions::estimated();
     [options.with_detail(Detail::Verdict), options, options.with_evidence(Evidence::Certified)]
 }
 

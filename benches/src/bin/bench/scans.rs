@@ -157,7 +157,7 @@ fn verdicts(
     options: &Options,
     score: &mut Score,
 ) -> Result<Sample, Failure> {
-    let asked = CollideOptions::default().with_evidence(Evidence::Certified);
+    let asked = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&asked, a, b)?;
     let (mut scratch, mut far) = (Scratch::default(), Sample::default());
     for (i, truth) in truths.iter().enumerate() {
@@ -228,7 +228,7 @@ fn truths(
 /// The mean time of a hinted query while the object moves in steps of `--step` from the clear
 /// poses.
 fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Result<f64, Failure> {
-    let asked = CollideOptions::default().with_evidence(Evidence::Certified).with_detail(Detail::Verdict);
+    let asked = CollideOptions::estimated().with_evidence(Evidence::Certified).with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&asked, a, b)?;
     let (mut scratch, mut all) = (Scratch::default(), Sample::default());
     let rng = &mut rng(options.seed ^ 1);

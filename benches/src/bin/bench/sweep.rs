@@ -72,7 +72,7 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
         Metric::Euclidean => None,
         Metric::Geodesic => Some(for_geodesic(&object, &scan)?),
     };
-    let asked = CollideOptions::default();
+    let asked = CollideOptions::estimated();
     let asked = options.order.map_or(asked, |order| asked.with_order(order));
     let verdict = asked.with_detail(Detail::Verdict);
     let mut methods: Vec<Box<dyn Method + '_>> = vec![Box::new(Ours::new(&scan, &verdict)?)];

@@ -219,7 +219,7 @@ fn again_and_again(scan: &Scan, poses: &[Vec<Pose>; DISTANCES]) -> Result<f64, F
 }
 
 fn verdict() -> CollideOptions {
-    CollideOptions::default().with_detail(Detail::Verdict)
+    CollideOptions::estimated().with_detail(Detail::Verdict)
 }
 
 /// The paper's options: random test points at leaves (§5.3), pairs ordered by sample points on

@@ -83,7 +83,7 @@ fn prepared(object: &Object) -> Result<Scan, Failure> {
 }
 
 fn verdict(method: Method) -> CollideOptions {
-    CollideOptions::default().with_detail(Detail::Verdict).with_method(method)
+    CollideOptions::estimated().with_detail(Detail::Verdict).with_method(method)
 }
 
 /// The interpolation search without hierarchy, by brackets alone as in the paper or, with

@@ -47,7 +47,7 @@ fn compare(source: &str, count: usize, seed: u64) -> Result<u32, Failure> {
         return Err(format!("{source}: expected a mesh to compare with, got none").into());
     };
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
-    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &scan, &scan)?;
     let [mut outside, mut hits, mut misses, mut undecided, mut inside, mut differ] = [0_u32; 6];
     for NearPose { pose, .. } in near(&object, count, seed)? {
         let truth = mesh.ask(&Pose::IDENTITY, &pose).hit;

@@ -14,7 +14,7 @@ fn score(set: &AnalyticSet) -> (Vec<String>, Vec<String>, usize) {
     let (mut wrong, mut undecided, mut judged) = (Vec::new(), Vec::new(), 0);
     for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
         let (a, b) = (&scans[pair.a], &scans[pair.b]);
-        let plan = CollidePlan::new(&CollideOptions::default(), a, b).unwrap();
+        let plan = CollidePlan::new(&CollideOptions::estimated(), a, b).unwrap();
         let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
         let verdict = Pair::new(va, vb).collide(&plan, &mut scratch).verdict;
         let case = format!(

@@ -16,7 +16,7 @@ fn no_certificate_is_false_and_nearly_all_clear_separations_have_one() {
     let set = analytic_set(2, &SetOptions { noises: vec![0.0, 0.1], repeats: 2 });
     let scans: Vec<Scan> = set.shapes.iter().map(|shape| scan(&shape.points)).collect();
     let mut scratch = Scratch::default();
-    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict);
     let (mut clear, mut certified) = (0, 0);
     for pair in &set.pairs {
         let (a, b) = (&scans[pair.a], &scans[pair.b]);
@@ -46,7 +46,7 @@ fn a_proof_covers_all_pairs_of_points() {
     let shape = sphere(1.0).sample(Sampling::clean(0.08));
     let scan = scan(&shape.points);
     let r = scorer_radius(&shape.points);
-    let plan = CollidePlan::new(&CollideOptions::default().with_evidence(Evidence::Certified), &scan, &scan)
+    let plan = CollidePlan::new(&CollideOptions::estimated().with_evidence(Evidence::Certified), &scan, &scan)
         .unwrap();
     let mut rng = arbitrary::rng(3);
     let mut scratch = Scratch::default();
@@ -93,7 +93,7 @@ fn leaves_that_were_compared_are_not_certified() {
             bowl.push([20.0 + 0.3 * f64::from(i), 0.3 * f64::from(j), 0.0]);
         }
     }
-    let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(Evidence::Certified);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(Evidence::Certified);
     for height in [0.35, 0.236] {
         let (a, b) = (scan(&bowl), scan(&lattice(0.02, &|x, _| height + 0.3 * x)));
         let plan = CollidePlan::new(&options, &a, &b).unwrap();
@@ -134,7 +134,7 @@ fn grids_along_the_axes_are_enclosed_to_their_rims() {
         1.0,
     ];
     let pose = Pose::from_row_major(&turned, scan.bounds(), 1e-6).unwrap();
-    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let options = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
     let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&pose));
     let meeting = [6.177_413_816_683_716, -0.653_311_282_612_506_4, 1.26e-7];
@@ -159,7 +159,7 @@ fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
         let scan = Scan::from_bytes(bytes, Check::Full).unwrap();
         let asked = |semantics| {
             let options =
-                CollideOptions::default().with_semantics(semantics).with_evidence(Evidence::Certified);
+                CollideOptions::estimated().with_semantics(semantics).with_evidence(Evidence::Certified);
             let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
             let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.0, 20.0, 0.0])));
             Pair::new(a, b).collide(&plan, &mut Scratch::default()).verdict
@@ -178,7 +178,7 @@ fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
 fn distances_are_proven_however_far() {
     let shape = sphere(1.0).sample(Sampling::clean(0.1));
     let scan = scan(&shape.points);
-    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let options = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
     for (away, share) in
         [(2.9, 0.05), (4.0, 0.4), (10.0, 0.7), (150.0, 0.8), (1000.0, 0.99), (1e30, 0.99), (1e60, 0.99)]

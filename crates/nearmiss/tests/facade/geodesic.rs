@@ -32,7 +32,7 @@ fn bytes(scan: &Scan) -> Vec<u8> {
 }
 
 fn ask(a: &Scan, b: &Scan, pose: &Pose, scratch: &mut Scratch) -> Verdict {
-    let plan = CollidePlan::new(&CollideOptions::default().with_semantics(Semantics::Surface), a, b).unwrap();
+    let plan = CollidePlan::new(&CollideOptions::estimated().with_semantics(Semantics::Surface), a, b).unwrap();
     Pair::new(a.at(&Pose::IDENTITY), b.at(pose)).collide(&plan, scratch).verdict
 }
 
@@ -183,7 +183,7 @@ fn the_metric_is_kept_and_a_plan_holds_to_it() {
     assert!(straight.normals() != geodesic.normals(), "other discs");
 
     let plan = |metric: Option<Metric>, a: &Scan, b: &Scan| {
-        let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+        let certified = CollideOptions::estimated().with_evidence(Evidence::Certified);
         CollidePlan::new(&metric.map_or(certified, |metric| certified.with_metric(metric)), a, b)
     };
     assert_eq!(plan(None, &straight, &straight).unwrap().options().metric, Some(Euclidean));
@@ -196,7 +196,7 @@ fn the_metric_is_kept_and_a_plan_holds_to_it() {
         assert_eq!(plan(metric, a, b).unwrap_err(), refused);
         assert!(refused.to_string().contains("prepare"), "{refused}");
     }
-    let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.1));
+    let balls = CollideOptions::estimated().with_semantics(Semantics::Thickened(0.1));
     assert!(CollidePlan::new(&balls, &straight, &geodesic).is_ok(), "points know no kernel");
 
     // Separated scans are never certified, whatever evidence is requested.
@@ -217,7 +217,7 @@ fn a_witness_is_verified_by_the_scans_own_kernel_alone() {
     let [_, geodesic] = both(&arbitrary::cloud(CloudKind::Sphere, 600, 3));
     let pose = Pose::from_translation([1.1, 0.2, 0.0]);
     let asked = |a: &Placed<'_>, b: &Placed<'_>| {
-        let plan = CollidePlan::new(&CollideOptions::default(), a.scan(), b.scan()).unwrap();
+        let plan = CollidePlan::new(&CollideOptions::estimated(), a.scan(), b.scan()).unwrap();
         match Pair::new(*a, *b).collide(&plan, &mut Scratch::default()).verdict {
             Verdict::Intersecting { contact, evidence } => (contact, evidence),
             other => panic!("{other:?}"),
@@ -299,7 +299,7 @@ fn worlds_and_batches_keep_graph_and_kernel() {
     let ball = sphere(1.0).sample(Sampling::clean(0.1));
     let [_, geodesic] = both(&ball.points);
     let geodesic = Arc::new(geodesic);
-    let options = CollideOptions::default().with_semantics(Semantics::Surface);
+    let options = CollideOptions::estimated().with_semantics(Semantics::Surface);
     let plan = CollidePlan::new(&options, &geodesic, &geodesic).unwrap();
     let poses: Vec<[Pose; 2]> = (0..8_u32)
         .map(|i| [Pose::IDENTITY, Pose::from_translation([1.0 + 0.1 * f64::from(i), 0.3, 0.1])])

@@ -36,7 +36,7 @@ fn verdicts_outside_the_band_do_not_change() {
         let back = motion.inverse();
         for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
             let (a, b) = (&moved[pair.a], &moved[pair.b]);
-            let plan = CollidePlan::new(&CollideOptions::default(), a, b).unwrap();
+            let plan = CollidePlan::new(&CollideOptions::estimated(), a, b).unwrap();
             let (pose_a, pose_b) = (pair.pose_a.after(&back), pair.pose_b.after(&back));
             let (va, vb) = (a.at(&pose_a), b.at(&pose_b));
             let verdict = Pair::new(va, vb).collide(&plan, &mut scratch).verdict;
@@ -82,7 +82,7 @@ fn exchanged_or_moved_together_they_are_as_far_apart() {
     let set = analytic_set(5, &SetOptions { noises: vec![0.0, 0.1], repeats: 1 });
     let scans: Vec<Scan> = set.shapes.iter().map(|shape| build(&shape.points)).collect();
     let mut rng = arbitrary::rng(6);
-    let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+    let certified = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let mut asked = 0;
     for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
         let (a, b) = (&scans[pair.a], &scans[pair.b]);
@@ -112,7 +112,7 @@ fn exchanged_or_moved_together_they_are_as_far_apart() {
 }
 
 fn thickened(radius: f64) -> CollideOptions {
-    CollideOptions::default().with_semantics(Semantics::Thickened(0.45 * radius))
+    CollideOptions::estimated().with_semantics(Semantics::Thickened(0.45 * radius))
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn a_finer_mesh_answers_as_the_coarser_did() {
         }
         let pose = arbitrary::rotation(&mut rng).with_translation(centre);
         for scan in &scans {
-            let verdict = ask(scan, &probe, [Pose::IDENTITY, pose], CollideOptions::default());
+            let verdict = ask(scan, &probe, [Pose::IDENTITY, pose], CollideOptions::estimated());
             assert_eq!(verdict.is_intersecting(), gap < 0.0, "gap {:.2} r: {verdict:?}", gap / r);
             assert_eq!(verdict.is_separated(), gap > 0.0, "gap {:.2} r: {verdict:?}", gap / r);
         }
@@ -230,8 +230,8 @@ fn a_graph_changes_no_verdict() {
         let joined = bare.clone().with_graph(&cloud, &GraphOptions::default(), None).unwrap();
         let size = bare.bounds().half_extents().into_iter().fold(0.0, f64::max);
         for options in [
-            CollideOptions::default(),
-            CollideOptions::default().with_evidence(Evidence::Certified).with_margin(0.01 * size),
+            CollideOptions::estimated(),
+            CollideOptions::estimated().with_evidence(Evidence::Certified).with_margin(0.01 * size),
         ] {
             for _ in 0..150 {
                 let pose =

@@ -14,7 +14,7 @@ fn scan(points: &[[f64; 3]]) -> Scan {
 }
 
 fn ask(a: &Placed<'_>, b: &Placed<'_>, detail: Detail) -> Answer {
-    let options = CollideOptions::default().with_evidence(Evidence::Certified).with_detail(detail);
+    let options = CollideOptions::estimated().with_evidence(Evidence::Certified).with_detail(detail);
     let plan = CollidePlan::new(&options, a.scan(), b.scan()).unwrap();
     Pair::new(*a, *b).collide(&plan, &mut Scratch::default())
 }

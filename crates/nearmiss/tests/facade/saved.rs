@@ -209,7 +209,7 @@ fn absurd_numbers_do_not_panic() {
             }
             let Ok(absurd) = Scan::from_bytes(absurd, Check::Structure) else { continue };
             let plan =
-                nearmiss::CollidePlan::new(&nearmiss::CollideOptions::default(), &absurd, &scan).unwrap();
+                nearmiss::CollidePlan::new(&nearmiss::CollideOptions::estimated(), &absurd, &scan).unwrap();
             let view = absurd.at(&Pose::from_translation([0.3, 0.1, 0.0]));
             for (a, b) in [(&view, &sound), (&sound, &view), (&view, &view)] {
                 let answer = Pair::new(*a, *b).collide(&plan, &mut Scratch::default());

@@ -164,11 +164,11 @@ pub struct CollideOptions {
     ///
     /// The margin is conservative: scans with two points nearer than it are never separated.
     pub margin: f64,
-    /// The evidence wanted for a separation of surfaces. Default: estimated. A certified separation
-    /// takes half as much more time on average, and two to three times the time near contact. It
-    /// yields a proven distance. If the proof fails, the separation is still reported, as
-    /// estimated. With the geodesic kernel separations are always estimated, as enclosures are
-    /// proven for Euclidean distances only.
+    /// The evidence wanted for a separation of surfaces. Default: certified, which yields a proven
+    /// distance. If the proof fails, the separation is still reported, as estimated. A search that
+    /// asks for [estimated](CollideOptions::estimated) separations takes two thirds of the time on
+    /// average, and a third to half of it near contact. With the geodesic kernel separations are
+    /// always estimated, as enclosures are proven for Euclidean distances only.
     pub evidence: Evidence,
     /// The metric that defines the surfaces; ignored for balls about points. Default: `None`, the
     /// metric that both scans were prepared for.
@@ -192,7 +192,7 @@ impl Default for CollideOptions {
             semantics: Semantics::default(),
             detail: Detail::default(),
             margin: 0.0,
-            evidence: Evidence::Estimated,
+            evidence: Evidence::Certified,
             metric: None,
             method: Method::default(),
             order: None,
@@ -202,6 +202,13 @@ impl Default for CollideOptions {
 }
 
 impl CollideOptions {
+    /// The default options with [estimated](Evidence::Estimated) separations: no proofs, and the
+    /// fastest search.
+    #[must_use]
+    pub fn estimated() -> Self {
+        Self { evidence: Evidence::Estimated, ..Self::default() }
+    }
+
     /// The same options with these semantics.
     #[must_use]
     pub const fn with_semantics(self, semantics: Semantics) -> Self {

@@ -38,7 +38,7 @@ use crate::question::Scratch;
 ///     let pose = Pose::from_translation([0.5, 0.5, height]);
 ///     MeshScanPair::new(floor.at(&Pose::IDENTITY), PlacedMesh::new(&tip, &pose))
 /// };
-/// let options = CollideOptions::default().with_evidence(Evidence::Certified);
+/// let options = CollideOptions::default();
 /// let plan = MeshScanPlan::new(&options, &floor)?;
 /// let Verdict::Intersecting { contact, evidence } = at(-0.1).collide(&plan, &mut scratch).verdict else {
 ///     panic!("the tip is below the floor");

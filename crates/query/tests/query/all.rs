@@ -85,7 +85,7 @@ fn one_contact_of_every_pair_of_leaves_whose_discs_cross() {
             let [surely, maybe] = crossing(&va, &vb);
             for detail in [Detail::Verdict, Detail::Witness] {
                 let options =
-                    CollideOptions::default().with_semantics(Semantics::Surface).with_detail(detail);
+                    CollideOptions::estimated().with_semantics(Semantics::Surface).with_detail(detail);
                 let plan = CollidePlan::new(&options, &a, &b).unwrap();
                 let answer = Pair::new(va, vb).contacts(&mut contacts).collide(&plan, &mut scratch);
                 assert!(contacts.complete, "without a budget");
@@ -132,7 +132,7 @@ fn one_contact_of_every_pair_of_leaves_with_near_points() {
                 }
             }
         }
-        let options = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
+        let options = CollideOptions::estimated().with_semantics(Semantics::Thickened(radius));
         let plan = CollidePlan::new(&options, &a, &b).unwrap();
         Pair::new(va, vb).contacts(&mut contacts).collide(&plan, &mut scratch);
         let list = found(&contacts, [&a, &b]);
@@ -148,7 +148,7 @@ fn a_budget_leaves_the_first_contacts() {
     let pose = Pose::from_translation([size, 0.1 * size, 0.0]);
     let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
     let plan = CollidePlan::new(
-        &CollideOptions::default().with_order(nearmiss_query::Order::DepthFirst),
+        &CollideOptions::estimated().with_order(nearmiss_query::Order::DepthFirst),
         &sphere,
         &sphere,
     )
@@ -178,8 +178,8 @@ fn test_points_and_margins_find_all_along_a_circle() {
     let pose = Pose::from_translation([size, 0.0, 0.0]);
     let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
     let (mut contacts, mut scratch) = (Contacts::default(), Scratch::default());
-    let sampling = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
-    for options in [sampling, CollideOptions::default().with_margin(0.05 * size)] {
+    let sampling = CollideOptions::estimated().with_method(Method::Sampling(Sampling::default()));
+    for options in [sampling, CollideOptions::estimated().with_margin(0.05 * size)] {
         let plan = CollidePlan::new(&options, &sphere, &sphere).unwrap();
         let answer = Pair::new(a, b).contacts(&mut contacts).collide(&plan, &mut scratch);
         assert!(matches!(answer.verdict, Verdict::Intersecting { .. }), "{answer:?}");

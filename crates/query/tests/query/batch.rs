@@ -59,7 +59,7 @@ fn batch(
 }
 
 fn options() -> [CollideOptions; 5] {
-    let options = CollideOptions::default();
+    let options = CollideOptions::estimated();
     [
         options,
         options.with_detail(Detail::Verdict),
@@ -107,7 +107,7 @@ fn a_batch_says_what_single_queries_say() {
 #[test]
 fn until_the_first_hit_answers_end_with_it() {
     let scan = prepared(CloudKind::Sphere, 300, 1);
-    let plan = plan(CollideOptions::default().with_detail(Detail::Verdict), &scan);
+    let plan = plan(CollideOptions::estimated().with_detail(Detail::Verdict), &scan);
     let at = |x: f64| [Pose::IDENTITY, Pose::from_translation([x, 0.0, 0.0])];
     let (apart, together) = (at(5.0), at(1.2));
     let mut scratch = BatchScratch::default();
@@ -192,7 +192,7 @@ fn every_question_is_asked_once() {
 #[test]
 fn a_deadline_spans_the_batch() {
     let scan = prepared(CloudKind::Sphere, 2000, 1);
-    let plan = plan(CollideOptions::default().with_order(Order::DepthFirst), &scan);
+    let plan = plan(CollideOptions::estimated().with_order(Order::DepthFirst), &scan);
     let poses = poses(100_000, 2.0, 3);
     let pairs = pairs(&scan, &poses);
     let unasked = |answer: &Answer| answer.statistics.node_pairs == 0;

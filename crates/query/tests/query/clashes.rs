@@ -81,7 +81,7 @@ fn clashes_are_components_of_all_contacts() {
             let link = [0.0, 0.05, 0.2, 1.0][round % 4] * size;
             let options = ClashOptions::default().with_semantics(semantics).with_link(link);
 
-            let touching = CollideOptions::default().with_semantics(semantics).with_detail(Detail::Verdict);
+            let touching = CollideOptions::estimated().with_semantics(semantics).with_detail(Detail::Verdict);
             let plan = CollidePlan::new(&touching, &a, &b).unwrap();
             let mut contacts = Contacts::default();
             Pair::new(va, vb).contacts(&mut contacts).collide(&plan, &mut Scratch::default());

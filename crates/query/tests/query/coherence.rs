@@ -50,7 +50,7 @@ fn hints_change_no_verdict() {
         let b = prepared(&arbitrary::cloud(*cloud, 300, n + 50));
         let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
         let r = a.sampling_radius();
-        let base = CollideOptions::default().with_detail(Detail::Verdict);
+        let base = CollideOptions::estimated().with_detail(Detail::Verdict);
         let surfaces = base.with_semantics(Semantics::Surface);
         let questions = [
             base,
@@ -135,7 +135,7 @@ fn a_hint_for_something_else_is_none() {
     for round in 0..600 {
         let (a, b) = (&scans[round % 4], &scans[(round / 3) % 4]);
         let margin = [0.0, 0.02 * size][round % 2];
-        let options = CollideOptions::default().with_detail(Detail::Verdict).with_margin(margin);
+        let options = CollideOptions::estimated().with_detail(Detail::Verdict).with_margin(margin);
         let plan = CollidePlan::new(&options, a, b).unwrap();
         let shift = arbitrary::point_in(&mut rng, 2.0 * size);
         let scale = [1.0, 1.01][(round / 5) % 2];
@@ -155,7 +155,7 @@ fn small_steps_cost_less_than_half() {
     let size = scan.bounds().half_extents()[0];
     for evidence in [Evidence::Estimated, Evidence::Certified] {
         let mut rng = arbitrary::rng(8);
-        let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(evidence);
+        let options = CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(evidence);
         let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
         let (mut cold, mut warm) = (0, 0);
         for _ in 0..20 {
@@ -182,7 +182,7 @@ fn small_steps_cost_less_than_half() {
 #[test]
 fn a_copy_of_a_hint_knows_the_same() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 1000, 3));
-    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &scan, &scan).unwrap();
     let mut hint = PairHint::default();
     let mut scratch = Scratch::default();
     for i in 0..50_u32 {
@@ -227,7 +227,7 @@ fn lifted(height: f64) -> [Pose; 2] {
 fn a_hint_certifies_nothing_that_was_not_proven() {
     let scan = prepared(&plate(20));
     let r = scan.sampling_radius();
-    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let options = CollideOptions::estimated().with_evidence(Evidence::Certified);
     let mut seen = [0; 2];
     for step in 1..20 {
         // The boxes of discs become disjoint long before the enclosures do.
@@ -249,7 +249,7 @@ fn test_points_see_the_same_with_a_hint() {
     let method = Method::Sampling(Sampling::default());
     let mut seen = [0; 3];
     for coverings in [false, true] {
-        let base = CollideOptions::default().with_detail(Detail::Verdict).with_method(method);
+        let base = CollideOptions::estimated().with_detail(Detail::Verdict).with_method(method);
         let options = base.with_coverings(coverings);
         let mut hint = PairHint::default();
         for step in 0..100 {
@@ -267,7 +267,7 @@ fn test_points_see_the_same_with_a_hint() {
 #[test]
 fn far_from_the_origin_a_hint_knows_no_better() {
     let scan = prepared(&plate(20));
-    let options = CollideOptions::default().with_margin(0.5).with_detail(Detail::Verdict);
+    let options = CollideOptions::estimated().with_margin(0.5).with_detail(Detail::Verdict);
     let mut rounded = 0;
     for away in [0.0, 2.0_f64.powi(40), 2.0_f64.powi(45)] {
         for step in 1..30 {
@@ -289,7 +289,7 @@ fn far_from_the_origin_a_hint_knows_no_better() {
 fn a_scan_of_which_a_point_moved_is_another() {
     let finger: Vec<_> = plate(4).iter().map(|p| p.map(|x| (x - 1.5) * 1e-4)).collect();
     let finger = prepared(&finger);
-    let options = CollideOptions::default().with_semantics(Semantics::Thickened(0.001));
+    let options = CollideOptions::estimated().with_semantics(Semantics::Thickened(0.001));
     let points = arbitrary::cloud(CloudKind::Coplanar, 1000, 1);
     let scan = prepared(&points);
     let mut hits = 0;
@@ -312,7 +312,7 @@ fn a_hinted_search_that_a_budget_ends_is_as_likely_to_hit_as_what_it_leaves_open
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 3));
     let mut hint = PairHint::default();
     let pose = |away: f64| [Pose::IDENTITY, Pose::from_translation([away, 0.1, 0.0])];
-    let options = CollideOptions::default();
+    let options = CollideOptions::estimated();
     both([&scan; 2], pose(2.05), &options, &Budget::UNLIMITED, &mut hint);
     let few = Budget::UNLIMITED.with_work(60);
     let [_, warm] = both([&scan; 2], pose(2.04), &options, &few, &mut hint);
@@ -323,7 +323,7 @@ fn a_hinted_search_that_a_budget_ends_is_as_likely_to_hit_as_what_it_leaves_open
 #[test]
 fn small_steps_count_after_a_leap() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 500, 3));
-    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict);
     let mut hint = PairHint::default();
     let near = Pose::from_translation([2.3, 0.0, 0.0]);
     both([&scan; 2], [Pose::IDENTITY, near], &options, &Budget::UNLIMITED, &mut hint);
@@ -345,7 +345,7 @@ fn small_steps_count_after_a_leap() {
 #[test]
 fn far_from_the_origin_a_hint_proves_no_greater_distance() {
     let scan = prepared(&plate(20));
-    let base = CollideOptions::default();
+    let base = CollideOptions::estimated();
     let both_kinds =
         [base.with_semantics(Semantics::Thickened(0.0)), base.with_evidence(Evidence::Certified)];
     let mut without_search = 0;

@@ -307,7 +307,7 @@ fn nothing_that_newton_finds_from_any_crossing_is_missing() {
         let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.8 * size));
         let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose)];
         let found = draw(&views[0], &views[1], CurveOptions::default());
-        let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
+        let surfaces = CollideOptions::estimated().with_semantics(Semantics::Surface);
         let plan = CollidePlan::new(&surfaces, &scan, &scan).unwrap();
         let mut contacts = Contacts::default();
         Pair::new(views[0], views[1]).contacts(&mut contacts).collide(&plan, &mut Scratch::default());

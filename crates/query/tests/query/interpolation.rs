@@ -24,7 +24,7 @@ fn scan_of(form: Form, spacing: f64, noise: f64) -> Scan {
 }
 
 fn options(search: Interpolation) -> CollideOptions {
-    CollideOptions::default().with_method(Method::Interpolation(search))
+    CollideOptions::estimated().with_method(Method::Interpolation(search))
 }
 
 fn flat() -> Interpolation {
@@ -53,7 +53,7 @@ fn no_verdict_is_wrong_outside_the_band() {
                     let whole = options(Interpolation::default()).with_detail(detail);
                     let verdict = ask(&a, &b, &whole, &mut scratch).verdict;
                     let by_discs =
-                        CollideOptions::default().with_semantics(Semantics::Surface).with_detail(detail);
+                        CollideOptions::estimated().with_semantics(Semantics::Surface).with_detail(detail);
                     let expected = ask(&a, &b, &by_discs, &mut scratch).verdict;
                     let is_open = pair.thin && verdict == Verdict::Undecided(Reason::Ambiguous);
                     assert!(is_open || verdict.is_intersecting() == pair.truth, "{}: {verdict:?}", case());
@@ -291,7 +291,7 @@ fn seeds_decide_and_scratch_does_not() {
                 let used = ask(&a, &b, &one, &mut scratch);
                 let fresh = ask(&a, &b, &one, &mut Scratch::default());
                 assert_eq!(used, fresh, "{search:?}");
-                let by_discs = ask(&a, &b, &CollideOptions::default(), &mut scratch);
+                let by_discs = ask(&a, &b, &CollideOptions::estimated(), &mut scratch);
                 if !search.flat {
                     assert_eq!(
                         used.verdict.is_intersecting(),

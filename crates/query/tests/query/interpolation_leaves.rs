@@ -75,7 +75,7 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
     let edges: Vec<[usize; 2]> =
         scans[0].graph.points().edges().edges().map(|edge| edge.map(|i| i as usize)).collect();
 
-    let options = CollideOptions::default()
+    let options = CollideOptions::estimated()
         .with_method(Method::Interpolation(Interpolation::default()))
         .with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&options, a.scan(), b.scan()).unwrap();

@@ -42,7 +42,7 @@ fn a_ball_in_a_floor_is_as_deep_as_it_is() {
     let (ball, floor) = (sampled(sphere(1.0), 0.05), sampled(patch(4.0, 4.0), 0.05));
     for depth in [0.01, 0.03, 0.06] {
         let poses = [lifted(1.0 - depth), Pose::IDENTITY];
-        let (verdict, places) = asked([&ball, &floor], poses, &CollideOptions::default());
+        let (verdict, places) = asked([&ball, &floor], poses, &CollideOptions::estimated());
         assert!(verdict.is_intersecting(), "{depth}");
         let first = places[0];
         // A point of the ball is within the sagitta of half a spacing from its pole.
@@ -54,7 +54,7 @@ fn a_ball_in_a_floor_is_as_deep_as_it_is() {
             assert!(place.gap <= 0.0 && place.gap >= first.gap);
         }
         // With the scans swapped, the normal is reversed.
-        let (_, turned) = asked([&floor, &ball], [poses[1], poses[0]], &CollideOptions::default());
+        let (_, turned) = asked([&floor, &ball], [poses[1], poses[0]], &CollideOptions::estimated());
         assert!((turned[0].gap - first.gap).abs() < 1e-6 && turned[0].normal[2] < -0.92, "{turned:?}");
     }
 }
@@ -62,7 +62,7 @@ fn a_ball_in_a_floor_is_as_deep_as_it_is() {
 #[test]
 fn the_places_under_a_box_are_spread() {
     let (brick, floor) = (sampled(cuboid([1.0, 0.6, 0.4]), 0.03), sampled(patch(4.0, 4.0), 0.03));
-    let (_, places) = asked([&brick, &floor], [lifted(0.19), Pose::IDENTITY], &CollideOptions::default());
+    let (_, places) = asked([&brick, &floor], [lifted(0.19), Pose::IDENTITY], &CollideOptions::estimated());
     assert_eq!(places.len(), 8);
     // There is a manifold point near each corner of the face.
     for (x, y) in [(0.5, 0.3), (-0.5, 0.3), (0.5, -0.3), (-0.5, -0.3)] {
@@ -88,7 +88,7 @@ fn a_solver_that_goes_the_way_out_gets_out() {
     let mut steps = 0;
     loop {
         let poses = [Pose::from_translation(at.into()), Pose::IDENTITY];
-        let (verdict, places) = asked([&ball, &room], poses, &CollideOptions::default());
+        let (verdict, places) = asked([&ball, &room], poses, &CollideOptions::estimated());
         if !verdict.is_intersecting() {
             assert!(places.is_empty());
             break;
@@ -111,19 +111,19 @@ fn normals_that_lead_out_tell_the_way() {
     let inside = [Pose::from_translation([0.0, 0.0, 0.82]), Pose::IDENTITY];
     // For a shell, the centre of the ball decides: the ball is inside. From a solid, the ball is
     // pushed out.
-    let (_, places) = asked([&ball, &shell], inside, &CollideOptions::default());
+    let (_, places) = asked([&ball, &shell], inside, &CollideOptions::estimated());
     assert!(places[0].normal[2] < -0.95 && (places[0].gap + 0.02).abs() < 5e-3, "{places:?}");
-    let (_, places) = asked([&ball, &solid], inside, &CollideOptions::default());
+    let (_, places) = asked([&ball, &solid], inside, &CollideOptions::estimated());
     assert!(places[0].normal[2] > 0.5 && places[0].gap < -0.02, "{places:?}");
     // The same from the side of the ball, which has no oriented normals.
-    let (_, places) = asked([&solid, &ball], [inside[1], inside[0]], &CollideOptions::default());
+    let (_, places) = asked([&solid, &ball], [inside[1], inside[0]], &CollideOptions::estimated());
     assert!(places[0].normal[2] < -0.5 && places[0].gap < -0.02, "{places:?}");
 }
 
 #[test]
 fn within_a_margin_gaps_are_positive() {
     let (ball, floor) = (sampled(sphere(1.0), 0.05), sampled(patch(4.0, 4.0), 0.05));
-    let options = CollideOptions::default().with_margin(0.1);
+    let options = CollideOptions::estimated().with_margin(0.1);
     let (verdict, places) = asked([&ball, &floor], [lifted(1.04), Pose::IDENTITY], &options);
     assert!(verdict.is_intersecting());
     assert!((places[0].gap - 0.04).abs() < 1e-3 && places.len() > 3, "{places:?}");
@@ -159,7 +159,7 @@ fn nothing_deeper_is_left_out() {
         let r = scans.iter().map(PointHierarchy::sampling_radius).fold(0.0, f64::max) * scale;
         let balls = round % 2 == 1;
         let semantics = if balls { Semantics::Thickened(0.4 * r) } else { Semantics::Surface };
-        let options = CollideOptions::default().with_semantics(semantics);
+        let options = CollideOptions::estimated().with_semantics(semantics);
         let (verdict, places) = asked([&scans[0], &scans[1]], poses, &options);
         let Verdict::Intersecting { contact, .. } = verdict else {
             assert!(places.is_empty(), "round {round}");
@@ -201,7 +201,7 @@ fn nothing_deeper_is_left_out() {
 #[test]
 fn a_budget_leaves_at_least_the_contact() {
     let (ball, floor) = (sampled(sphere(1.0), 0.05), sampled(patch(4.0, 4.0), 0.05));
-    let plan = CollidePlan::new(&CollideOptions::default(), &ball, &floor).unwrap();
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &ball, &floor).unwrap();
     let (a, b) = (Placed::new(&ball, &lifted(0.97)), Placed::new(&floor, &Pose::IDENTITY));
     let (mut scratch, mut places) = (Scratch::default(), Vec::new());
     let mut counts = Vec::new();

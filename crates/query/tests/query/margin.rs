@@ -44,7 +44,7 @@ fn points_within_the_margin_are_never_separated() {
             for factor in [0.01, 0.7, 0.999_999, 1.000_001, 1.3, 20.0] {
                 let margin = factor * nearest.distance;
                 for evidence in [Evidence::Estimated, Evidence::Certified] {
-                    let options = CollideOptions::default()
+                    let options = CollideOptions::estimated()
                         .with_detail(Detail::Verdict)
                         .with_margin(margin)
                         .with_evidence(evidence);
@@ -60,7 +60,7 @@ fn points_within_the_margin_are_never_separated() {
                     }
                 }
                 let thick = 0.1 * nearest.distance;
-                let options = CollideOptions::default()
+                let options = CollideOptions::estimated()
                     .with_semantics(Semantics::Thickened(thick))
                     .with_margin(0.8 * margin);
                 let expected = oracle::touches(nearest.distance, thick, 0.8 * margin);
@@ -87,7 +87,7 @@ fn spheres_meet_within_a_margin_of_their_distance() {
             let pose = arbitrary::rotation(&mut rng).with_translation(direction.map(|c| c * (2.0 + gap)));
             let (va, vb) = (Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose));
             for (margin, meets) in [(gap + r, true), (gap - r, false)] {
-                let options = CollideOptions::default().with_margin(margin);
+                let options = CollideOptions::estimated().with_margin(margin);
                 let verdict = ask(&va, &vb, options).verdict;
                 assert_eq!(verdict.is_intersecting(), meets, "gap {gap}, margin {margin}: {verdict:?}");
                 let Verdict::Intersecting { contact, evidence } = verdict else {
@@ -115,7 +115,7 @@ fn spheres_meet_within_a_margin_of_their_distance() {
 fn a_margin_that_is_no_length_is_refused() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 100, 1));
     for margin in [-1.0, f64::NAN, f64::INFINITY] {
-        let plan = CollidePlan::new(&CollideOptions::default().with_margin(margin), &scan, &scan);
+        let plan = CollidePlan::new(&CollideOptions::estimated().with_margin(margin), &scan, &scan);
         assert!(plan.unwrap_err().to_string().contains("margin"), "{margin}");
     }
 }

@@ -159,7 +159,7 @@ fn check(case: &Case, semantics: Semantics, margin: f64, what: &str) -> Option<b
     };
     let surely: BTreeSet<_> = pairs.all.iter().filter(|p| p.2 < -lost(p.3)).map(leaf).collect();
     let maybe: BTreeSet<_> = pairs.all.iter().filter(|p| p.2 < lost(p.3)).map(leaf).collect();
-    let options = CollideOptions::default().with_semantics(semantics).with_margin(margin);
+    let options = CollideOptions::estimated().with_semantics(semantics).with_margin(margin);
     let pair = MeshScanPair::new(placed, PlacedMesh::new(mesh, &poses[1]));
     let mut verdicts = vec![];
     for level in levels() {
@@ -419,7 +419,7 @@ fn the_methods_of_the_papers_are_refused() {
     let points = arbitrary::cloud(CloudKind::Sphere, 200, 1);
     let scan =
         PointHierarchy::build(&PointCloud::cleaned(&points).unwrap(), &BuildOptions::default()).unwrap();
-    let options = CollideOptions::default();
+    let options = CollideOptions::estimated();
     for refused in [
         options.with_method(Method::Sampling(Sampling::default())),
         options.with_order(Order::Sides),

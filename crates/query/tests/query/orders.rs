@@ -56,7 +56,7 @@ fn orders_and_coverings_change_no_verdict() {
                 .with_translation(arbitrary::point_in(&mut rng, 2.5 * size))
                 .with_scale([1.0, 0.6][round % 2]);
             let margin = [0.0, 0.05 * size][round / 30];
-            let base = CollideOptions::default()
+            let base = CollideOptions::estimated()
                 .with_detail([Detail::Verdict, Detail::Witness][round % 2])
                 .with_margin(margin);
             let certified = base.with_evidence(Evidence::Certified);
@@ -92,7 +92,7 @@ fn work_budgets_are_reproducible_in_every_order() {
     for _ in 0..40 {
         let pose = Pose::from_translation(arbitrary::unit_vector(&mut rng).map(|x| 1.98 * x));
         for order in ORDERS {
-            let options = CollideOptions::default().with_order(order);
+            let options = CollideOptions::estimated().with_order(order);
             let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
             let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose)];
             for work in [0, 1, 7, 60, 500] {
@@ -117,7 +117,7 @@ fn work_budgets_are_reproducible_in_every_order() {
 fn a_resolution_saves_work_and_errs_towards_contact() {
     let scan = sphere(20_000);
     let r = scan.sampling_radius();
-    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let options = CollideOptions::estimated().with_detail(Detail::Verdict);
     let mut before = u64::MAX;
     for times in [0.0, 2.0, 4.0, 8.0, 16.0] {
         let budget = Budget::UNLIMITED.with_resolution(times * r);
@@ -145,7 +145,7 @@ fn a_resolution_saves_work_and_errs_towards_contact() {
 fn test_points_see_what_surfaces_do() {
     let scan = sphere(4000);
     let r = scan.sampling_radius();
-    let base = CollideOptions::default().with_detail(Detail::Verdict);
+    let base = CollideOptions::estimated().with_detail(Detail::Verdict);
     for flat in [false, true] {
         let sampling = Sampling::default().with_flat(flat);
         let options = base.with_method(Method::Sampling(sampling));
@@ -177,7 +177,7 @@ fn test_points_see_what_surfaces_do() {
         assert!(gap <= away - 2.0 + 1e-6 && (gap > 0.0) == proven, "{gap}");
     }
     // A witness from a test point is verified.
-    let options = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
+    let options = CollideOptions::estimated().with_method(Method::Sampling(Sampling::default()));
     let pose = Pose::from_translation([1.5, 0.0, 0.0]);
     let answer = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED);
     assert!(
@@ -194,7 +194,7 @@ fn test_points_depend_on_seed_and_leaves_alone() {
     let pose = Pose::from_translation([2.0 + 0.3 * r, 0.0, 0.0]);
     let estimate = |order, seed| {
         let sampling = Sampling::default().with_seed(seed).with_tolerance(0.1);
-        let options = CollideOptions::default().with_method(Method::Sampling(sampling)).with_order(order);
+        let options = CollideOptions::estimated().with_method(Method::Sampling(sampling)).with_order(order);
         ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED).distance_estimate
     };
     let first = estimate(Order::DepthFirst, 1);
@@ -206,7 +206,7 @@ fn test_points_depend_on_seed_and_leaves_alone() {
 #[test]
 fn what_cannot_be_sampled_is_refused() {
     let scan = sphere(100);
-    let method = |sampling| CollideOptions::default().with_method(Method::Sampling(sampling));
+    let method = |sampling| CollideOptions::estimated().with_method(Method::Sampling(sampling));
     let refused = |options: CollideOptions| CollidePlan::new(&options, &scan, &scan).unwrap_err();
     let plain = Sampling::default();
     assert_eq!(refused(method(plain.with_test_points(0))), PlanError::TestPoints(0));
@@ -226,7 +226,7 @@ fn ended_searches_by_test_points_are_as_likely_to_hit_as_what_they_leave_open() 
     let pose = Pose::from_translation([1.0, 0.1, 0.0]);
     for flat in [false, true] {
         let sampling = Sampling::default().with_flat(flat).with_tolerance(1e-9);
-        let options = CollideOptions::default().with_method(Method::Sampling(sampling));
+        let options = CollideOptions::estimated().with_method(Method::Sampling(sampling));
         for work in [0, 10, 100, 1000] {
             let answer = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED.with_work(work));
             let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict else {
@@ -241,7 +241,7 @@ fn ended_searches_by_test_points_are_as_likely_to_hit_as_what_they_leave_open() 
 fn paces_that_are_none_are_mended() {
     let scan = sphere(1000);
     let r = scan.sampling_radius();
-    let options = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
+    let options = CollideOptions::estimated().with_method(Method::Sampling(Sampling::default()));
     let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
     let apart = Pose::from_translation([2.0 + 2.0 * r, 0.0, 0.0]);
     let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &apart)];
@@ -277,7 +277,7 @@ fn closer_looks_do_not_use_up_what_damaged_files_are_allowed() {
     // Parallel to itself, just out of reach: thousands of node pairs and no contact.
     let height = 1.02 * margin / f64::sqrt(0.09 + 0.49 + 1.0);
     let pose = Pose::from_translation([0.3, -0.7, -1.0].map(|x| x * height));
-    let options = CollideOptions::default().with_margin(margin);
+    let options = CollideOptions::estimated().with_margin(margin);
     for order in ORDERS {
         let answer = ask(&scan, &scan, &pose, &options.with_order(order), &Budget::UNLIMITED);
         assert!(answer.verdict.is_separated(), "{order:?}: {answer:?}");
@@ -298,7 +298,7 @@ fn no_resolution_misses_what_meets() {
             let pose = arbitrary::rotation(&mut rng)
                 .with_translation(arbitrary::point_in(&mut rng, 2.5 * size))
                 .with_scale([1.0, 0.3][round % 2]);
-            let options = CollideOptions::default().with_detail(Detail::Verdict);
+            let options = CollideOptions::estimated().with_detail(Detail::Verdict);
             let fine = ask(&a, &b, &pose, &options, &Budget::UNLIMITED).verdict;
             for times in [0.5, 2.0, 5.0, 20.0] {
                 let budget = Budget::UNLIMITED.with_resolution(times * a.sampling_radius());
@@ -318,7 +318,7 @@ fn no_resolution_misses_what_meets() {
 /// The likelihood after one unit of work, from the two root boxes alone.
 fn first_guess(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose) -> f64 {
     let budget = Budget::UNLIMITED.with_work(1);
-    let answer = ask(a, b, pose, &CollideOptions::default().with_detail(Detail::Verdict), &budget);
+    let answer = ask(a, b, pose, &CollideOptions::estimated().with_detail(Detail::Verdict), &budget);
     let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict else { panic!("{answer:?}") };
     likelihood
 }

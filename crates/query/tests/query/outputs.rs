@@ -65,7 +65,7 @@ fn outputs_are_the_same_in_every_combination() {
         let scans = [prepared(kind, 400, n), prepared(kind, 300, n + 7)];
         let r = scans[0].sampling_radius();
         let size = scans[0].bounds().half_extents().into_iter().fold(0.0, f64::max);
-        let sure = CollideOptions::default().with_evidence(Evidence::Certified);
+        let sure = CollideOptions::estimated().with_evidence(Evidence::Certified);
         for options in [
             sure,
             sure.with_detail(Detail::Verdict).with_margin(0.5 * r),

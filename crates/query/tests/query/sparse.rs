@@ -11,7 +11,7 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
 }
 
 fn ask(a: &Placed<'_>, b: &Placed<'_>) -> Verdict {
-    let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
+    let surfaces = CollideOptions::estimated().with_semantics(Semantics::Surface);
     let plan = CollidePlan::new(&surfaces, a.scan(), b.scan()).unwrap();
     Pair::new(*a, *b).collide(&plan, &mut Scratch::default()).verdict
 }

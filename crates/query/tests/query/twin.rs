@@ -121,7 +121,7 @@ fn surfaces_meet_where_some_discs_cross() {
             let pose = arbitrary::rotation(&mut rng).with_translation(spread);
             let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose));
             let (slack, doubtful) = best_crossing(&va, &vb);
-            let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
+            let surfaces = CollideOptions::estimated().with_semantics(Semantics::Surface);
             let options = surfaces.with_detail(Detail::Verdict);
             let verdict = ask(&va, &vb, options, &Budget::UNLIMITED).verdict;
             // In between, rounding and the thickness of nearly parallel discs decide.
@@ -160,7 +160,7 @@ fn thickened_equals_brute_force() {
             let (va, vb) = (Placed::new(&a, &pose_a), Placed::new(&b, &pose_b));
             for factor in [0.0, 0.3, 0.499_999, 0.500_001, 0.7, 5.0] {
                 let radius = factor * nearest.distance;
-                let options = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
+                let options = CollideOptions::estimated().with_semantics(Semantics::Thickened(radius));
                 let expected = oracle::touches(nearest.distance, radius, 0.0);
                 match ask(&va, &vb, options, &Budget::UNLIMITED).verdict {
                     Verdict::Intersecting { contact, evidence: Evidence::Certified } => {
@@ -197,7 +197,7 @@ fn a_witness_lies_on_both_surfaces() {
         let shift = direction.map(|x| 1.2 * size * x);
         let pose = arbitrary::rotation(&mut rng).with_translation(shift);
         let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
-        let answer = ask(&a, &b, CollideOptions::default(), &Budget::UNLIMITED);
+        let answer = ask(&a, &b, CollideOptions::estimated(), &Budget::UNLIMITED);
         let Verdict::Intersecting { contact, evidence } = answer.verdict else { panic!("spheres meet") };
         if evidence == Evidence::Certified {
             certified += 1;
@@ -218,7 +218,7 @@ fn a_work_budget_is_kept_and_reproducible() {
     let pose = Pose::from_translation([1.9 * size, 0.2 * size, 0.1 * size]);
     let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
     // A fixed order, as another one may find another contact first.
-    let options = CollideOptions::default().with_order(Order::DepthFirst);
+    let options = CollideOptions::estimated().with_order(Order::DepthFirst);
     let unlimited = ask(&a, &b, options, &Budget::UNLIMITED);
     for work in [0, 1, 10, 50, 1_000_000] {
         let budget = Budget::default().with_work(work);
@@ -251,7 +251,7 @@ fn lattice(half: i32, spacing: f64) -> Vec<[f64; 3]> {
 #[test]
 fn grazing_sheets_touch_flat_or_not() {
     let flat = prepared(&lattice(25, 1.0));
-    let verdict = CollideOptions::default().with_detail(Detail::Verdict);
+    let verdict = CollideOptions::estimated().with_detail(Detail::Verdict);
     // Discs have a radius of about 0.65 · 1.41. Sheets touch within a twentieth of that.
     for (lift, touches) in [(0.0, true), (0.02, true), (0.04, true), (0.06, false), (0.5, false)] {
         let pose = Pose::from_translation([0.3, 0.2, lift]);
@@ -271,7 +271,7 @@ fn contacts_of_coarse_and_fine_lie_on_both() {
         let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.4));
         let (a, b) = (Placed::new(&coarse, &Pose::IDENTITY), Placed::new(&fine, &pose));
         let (a, b) = if round % 2 == 0 { (a, b) } else { (b, a) };
-        let options = CollideOptions::default().with_detail(Detail::Verdict);
+        let options = CollideOptions::estimated().with_detail(Detail::Verdict);
         if let Verdict::Intersecting { contact, .. } = ask(&a, &b, options, &Budget::UNLIMITED).verdict {
             hits += 1;
             let in_fine = pose.apply_inverse(contact.point);
@@ -301,7 +301,7 @@ fn a_pose_that_is_none_is_undecided() {
         let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
         for (a, b) in [(a, b), (b, a)] {
             for semantics in [Semantics::Surface, Semantics::Thickened(0.1)] {
-                let options = CollideOptions::default().with_semantics(semantics);
+                let options = CollideOptions::estimated().with_semantics(semantics);
                 let verdict = ask(&a, &b, options, &Budget::UNLIMITED).verdict;
                 assert_eq!(verdict, Verdict::Undecided(Reason::Pose), "{pose:?}");
             }
@@ -322,7 +322,7 @@ fn balls_that_surely_meet_are_likely_to() {
     let size = sphere.bounds().half_extents()[0];
     let pose = Pose::from_translation([3.0 * size, 0.0, 0.0]);
     let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
-    let options = CollideOptions::default().with_semantics(Semantics::Thickened(5.0 * size));
+    let options = CollideOptions::estimated().with_semantics(Semantics::Thickened(5.0 * size));
     for work in [0, 1, 5] {
         let verdict = ask(&a, &b, options, &Budget::default().with_work(work)).verdict;
         let Verdict::Undecided(Reason::Budget { likelihood }) = verdict else { panic!("{verdict:?}") };
@@ -346,7 +346,7 @@ fn signs_of_normals_change_no_answer() {
             .collect();
         turned.turn_normals(&either);
         let size = plain.bounds().half_extents().into_iter().fold(0.0, f64::max);
-        let options = CollideOptions::default();
+        let options = CollideOptions::estimated();
         for options in [
             options,
             options.with_detail(Detail::Verdict),

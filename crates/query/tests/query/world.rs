@@ -32,7 +32,7 @@ static SCANS: LazyLock<[PointHierarchy; 5]> = LazyLock::new(|| {
 });
 
 fn options() -> [CollideOptions; 4] {
-    let options = CollideOptions::default();
+    let options = CollideOptions::estimated();
     [
         options,
         options.with_evidence(Evidence::Certified),
@@ -260,7 +260,7 @@ fn naive_bounds((_, scan, pose): &(BodyId, usize, Pose)) -> [[f64; 3]; 2] {
 fn boxes_are_those_of_enclosures_and_no_larger() {
     let (world, placed) = crowd(200);
     for margin in [0.0, 0.5, 100.0] {
-        let options = CollideOptions::default().with_margin(margin);
+        let options = CollideOptions::estimated().with_margin(margin);
         let plan = CollidePlan::new(&options, &SCANS[0], &SCANS[0]).unwrap();
         let near = near(&world, Bodies::All, &plan);
         let mut seen = [0, 0];
@@ -311,7 +311,7 @@ fn hostile_poses_are_near_everything_and_undecided() {
 
 #[test]
 fn an_empty_world_and_one_of_a_single_body_say_nothing() {
-    let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[0]).unwrap();
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &SCANS[0], &SCANS[0]).unwrap();
     let mut world: World<&PointHierarchy> = World::new();
     let told = |world: &World<&PointHierarchy>| asked(world, Bodies::All, &plan);
     assert_eq!((world.len(), world.is_empty(), told(&world)), (0, true, vec![]));
@@ -329,7 +329,7 @@ fn an_empty_world_and_one_of_a_single_body_say_nothing() {
 
 #[test]
 fn one_scan_in_one_place_many_times() {
-    let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[0]).unwrap();
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &SCANS[0], &SCANS[0]).unwrap();
     let mut world = World::new();
     let ids: Vec<BodyId> = (0..40).map(|_| world.insert(&SCANS[0], &Pose::IDENTITY)).collect();
     let told = asked(&world, Bodies::All, &plan);

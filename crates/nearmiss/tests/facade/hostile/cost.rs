@@ -38,7 +38,7 @@ fn boundless_boxes_end_a_query_undecided_unless_told_otherwise() {
     for half in [10.0, 1e12] {
         let lying = with_boundless_boxes(&scan, half);
         for semantics in [Semantics::Surface, Semantics::Thickened(0.01)] {
-            let options = CollideOptions::default().with_semantics(semantics);
+            let options = CollideOptions::estimated().with_semantics(semantics);
             let plan = CollidePlan::new(&options, &lying, &lying).unwrap();
             let ask = |budget: &Budget| {
                 Pair::new(lying.at(&Pose::IDENTITY), lying.at(&away))
@@ -73,7 +73,7 @@ fn sound_scans_stay_far_below_the_limit() {
         Scan::build(&cloud, &BuildOptions::default()).unwrap()
     };
     let (a, b) = (noise(1), noise(2));
-    let options = CollideOptions::default().with_semantics(Semantics::Thickened(1e-9));
+    let options = CollideOptions::estimated().with_semantics(Semantics::Thickened(1e-9));
     let plan = CollidePlan::new(&options, &a, &b).unwrap();
     let answer =
         Pair::new(a.at(&Pose::IDENTITY), b.at(&Pose::IDENTITY)).collide(&plan, &mut Scratch::default());

@@ -42,7 +42,7 @@ pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let mut collide = Vec::new();
     let everything =
         (4 * scan.topology().len() * 4 * other.topology().len().max(scan.topology().len())) as u64;
-    let surface = CollideOptions::default();
+    let surface = CollideOptions::estimated();
     let balls = surface.with_semantics(Semantics::Thickened(1e-3 * size));
     let all = [
         surface.with_detail(Detail::Verdict).with_evidence(Evidence::Certified),
