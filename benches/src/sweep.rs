@@ -13,6 +13,7 @@ use nearmiss::Pose;
 use crate::clock::{nanoseconds, timed};
 use crate::poses::{DISTANCES, NearPose};
 use crate::rivals::Method;
+use crate::rivals::program::Engine;
 use crate::sample::{Sample, count};
 
 /// Warm-up poses before each distance.
@@ -56,6 +57,15 @@ impl Column {
     #[expect(clippy::cast_precision_loss, reason = "a mean of counts")]
     pub fn mean_node_pairs(&self) -> f64 {
         self.node_pairs as f64 / count(self.times.len().max(1))
+    }
+
+    fn of_verdicts(verdicts: &[(bool, f64)]) -> Self {
+        let mut column = Self::default();
+        for &(hit, time) in verdicts {
+            column.times.push(time);
+            column.hits += usize::from(hit);
+        }
+        column
     }
 
     fn add(&mut self, other: &Self) {
@@ -102,6 +112,27 @@ impl Track {
     pub fn inner_mean(&self) -> f64 {
         let inner = &self.columns[..=6];
         inner.iter().map(|column| column.times.summary().mean).sum::<f64>() / count(inner.len())
+    }
+}
+
+impl Track {
+    /// The track of a program that answered the poses of all passes, one after another, and then
+    /// those near first touch.
+    #[must_use]
+    pub fn of_engine(engine: &Engine, passes: usize, per_distance: usize) -> Self {
+        let mut track = Self { name: engine.name.replace('-', " "), ..Self::default() };
+        let (swept, near) = engine.verdicts.split_at(passes * DISTANCES * per_distance);
+        for pass in swept.chunks(DISTANCES * per_distance) {
+            let mut sum = 0.0;
+            for (column, verdicts) in track.columns.iter_mut().zip(pass.chunks(per_distance)) {
+                let of_pass = Column::of_verdicts(verdicts);
+                sum += of_pass.times.summary().mean;
+                column.add(&of_pass);
+            }
+            track.pass_means.push(sum / count(DISTANCES));
+        }
+        track.near = Column::of_verdicts(&near[WARM_UP.min(near.len() / 2)..]);
+        track
     }
 }
 

@@ -119,7 +119,8 @@ fn least_distance(scan: &Scan, a: &Placed<'_>, b: &Placed<'_>, scratch: &mut Scr
 /// Returns the distance at which the points, not the surfaces, first come within r of each other,
 /// by bisection from far away with the exact query for thickened points.
 fn first_touch(scan: &Scan) -> Outcome<f64> {
-    let balls = CollideOptions::estimated().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
+    let balls =
+        CollideOptions::estimated().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
     let plan = CollidePlan::new(&balls, scan, scan)?;
     let mut scratch = Scratch::default();
     let mut touches = |distance: f64| {

@@ -243,7 +243,8 @@ impl Asker {
         let found = self.distance(&views)?;
         let evidence = if a.metric() == Metric::Geodesic { Evidence::Estimated } else { Evidence::Certified };
         let certified = CollideOptions::estimated().with_evidence(evidence);
-        let quick = CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(Evidence::Estimated);
+        let quick =
+            CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(Evidence::Estimated);
         let balls = Semantics::Thickened(0.5 * found.band);
         let sure = self.collide(&views, &certified)?;
         let gap = if let Verdict::Separated { gap, .. } = sure { gap } else { 0.0 };

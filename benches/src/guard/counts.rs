@@ -74,7 +74,8 @@ impl Scenario {
     /// # Errors
     /// When it cannot be prepared.
     pub fn run(self) -> Result<(), Failure> {
-        let quick = CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(Evidence::Estimated);
+        let quick =
+            CollideOptions::estimated().with_detail(Detail::Verdict).with_evidence(Evidence::Estimated);
         let certified = CollideOptions::estimated().with_evidence(Evidence::Certified);
         match self {
             Self::Sweep => verdicts(&sweep()?, &quick),

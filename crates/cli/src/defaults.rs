@@ -2,8 +2,7 @@
 
 use clap::Parser;
 use nearmiss::{
-    BuildOptions, ClashOptions, CollideOptions, CurveOptions, DistanceOptions, GraphOptions,
-    PointCloud, Scan,
+    BuildOptions, ClashOptions, CollideOptions, CurveOptions, DistanceOptions, GraphOptions, PointCloud, Scan,
 };
 
 use crate::{Cli, Command, clash, collide, curve, distance, preprocess};

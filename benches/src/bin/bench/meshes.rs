@@ -5,13 +5,15 @@
 //! share of poses whose best answer differs from the exact one.
 
 use std::hint::black_box;
+use std::path::PathBuf;
 
 use nearmiss::hierarchy::Relative;
 use nearmiss::{Budget, Mesh, MeshBuildOptions, MeshPair, MeshQuality, MeshScratch, Pose};
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
-use nearmiss_benches::rivals::Method;
+use nearmiss_benches::plot::{self, Axis, Line, Panel};
 use nearmiss_benches::rivals::parry::MeshTree;
+use nearmiss_benches::rivals::{Method, program};
 use nearmiss_benches::sample::{Sample, count};
 use nearmiss_benches::{Failure, machine, poses};
 
@@ -23,6 +25,12 @@ pub(crate) struct Options {
     /// Poses at each distance
     #[arg(long, value_name = "N", default_value_t = 300)]
     per_distance: usize,
+    /// A program that times rivals of other languages, built by `benches/rivals/build.sh`
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// Draws time over error as an SVG
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
     /// Numbers of probable pairs at which a query stops
     #[arg(long, value_name = "K", default_values_t = [1, 3, 10])]
     k_min: Vec<u32>,
@@ -36,7 +44,30 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}", machine::description());
-    options.objects.iter().try_for_each(|source| measure(source, options))
+    let mut panels =
+        [panel("stopped by k_min = 3 pairs of p_min and more"), panel("stopped after 16 to 256 node pairs")];
+    for (colour, source) in options.objects.iter().enumerate() {
+        let (name, curves) = measure(source, options)?;
+        for (panel, points) in panels.iter_mut().zip([curves.by_quality, curves.by_budget]) {
+            panel.lines.push(Line { name: name.clone(), points, colour, dashed: false });
+        }
+    }
+    if let Some(path) = &options.image {
+        std::fs::write(path, plot::figure(&panels)?)?;
+    }
+    Ok(())
+}
+
+fn panel(title: &str) -> Panel {
+    let axes = [Axis::even("wrong answers, %"), Axis::even("mean time, µs")];
+    Panel { title: title.into(), axes, lines: Vec::new() }
+}
+
+/// Time over error of one object, from the exact query on: the curve of the slides.
+#[derive(Debug)]
+struct Curves {
+    by_quality: Vec<[f64; 2]>,
+    by_budget: Vec<[f64; 2]>,
 }
 
 /// The times of one method, and its wrong answers.
@@ -65,6 +96,23 @@ impl Column {
             hits.push(hit);
         }
         (column, hits)
+    }
+
+    /// The answers of another program.
+    fn of_verdicts(verdicts: &[(bool, f64)], truth: &[bool]) -> Self {
+        let mut column = Self::default();
+        for (&(hit, time), &truth) in verdicts.iter().zip(truth) {
+            column.times.push(time);
+            column.false_hits += usize::from(hit && !truth);
+            column.misses += usize::from(!hit && truth);
+        }
+        column
+    }
+
+    /// Error in percent and mean time in microseconds.
+    fn place(&self) -> [f64; 2] {
+        let wrong = count(self.false_hits + self.misses) / count(self.times.len());
+        [100.0 * wrong, self.times.summary().mean / 1000.0]
     }
 
     fn row(&self, name: &str) {
@@ -110,7 +158,7 @@ fn prepared(object: &Object) -> Result<Mesh, Failure> {
     Ok(own)
 }
 
-fn measure(source: &str, options: &Options) -> Result<(), Failure> {
+fn measure(source: &str, options: &Options) -> Result<(String, Curves), Failure> {
     let object = Object::read(source)?.scaled()?;
     let mesh = prepared(&object)?;
     let root = *mesh.arrays().tree.root_box();
@@ -131,31 +179,48 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     let mut rival = MeshTree::new(object.mesh.as_ref().ok_or("the object has no mesh")?);
     let (parry, _) = Column::ask(&all, Some(&truth), |pose| rival.ask(&Pose::IDENTITY, pose).hit);
     parry.row("parry BVH + f64 triangles");
+    let engines = match &options.program {
+        Some(program) => program::run(program, &object, &all, true)?,
+        None => Vec::new(),
+    };
+    for engine in &engines {
+        Column::of_verdicts(&engine.verdicts, &truth).row(&engine.name);
+    }
     let (ordered, _) = Column::ask(&all, Some(&truth), |pose| {
         pair(pose).collide_likely(&MeshQuality::default(), &mut scratch).likely_meets()
     });
     ordered.row("exact, most probable first");
+    let mut curves = Curves { by_quality: vec![exact.place()], by_budget: vec![exact.place()] };
     for &shared in &options.shared {
         for &k_min in &options.k_min {
-            for p_min in [0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 0.9999] {
+            for p_min in [0.9999, 0.999, 0.99, 0.95, 0.9, 0.8, 0.5] {
                 let quality = MeshQuality::default().with_p_min(p_min).with_k_min(k_min).with_shared(shared);
                 let (column, _) = Column::ask(&all, Some(&truth), |pose| {
                     let answer = pair(pose).collide_likely(&quality, &mut scratch);
                     !answer.verdict.is_separated()
                 });
                 column.row(&format!("p_min {p_min}, k_min {k_min}, x {shared}"));
+                if (k_min, shared) == (MeshQuality::default().k_min, MeshQuality::default().shared) {
+                    curves.by_quality.push(column.place());
+                }
             }
         }
     }
-    for work in [16, 32, 48, 64, 96, 128, 192, 256] {
+    for work in [256, 192, 128, 96, 64, 48, 32, 16] {
         let budget = Budget::UNLIMITED.with_work(work);
         let (column, _) = Column::ask(&all, Some(&truth), |pose| {
             pair(pose).within(&budget).collide(&mut scratch).likely_meets()
         });
         column.row(&format!("{work} node pairs"));
+        curves.by_budget.push(column.place());
     }
     let apart: Vec<Pose> = all.iter().zip(&truth).filter(|(_, hit)| !**hit).map(|(pose, _)| *pose).collect();
     let (distance, _) = Column::ask(&apart, None, |pose| pair(pose).distance(&mut scratch).upper > 0.0);
     distance.row("distance of separated copies");
-    Ok(())
+    for engine in engines.iter().filter(|engine| !engine.distances.is_empty()) {
+        let mut column = Column::default();
+        engine.distances.iter().for_each(|&(_, time)| column.times.push(time));
+        column.row(&format!("distance by {}", engine.name));
+    }
+    Ok((object.name, curves))
 }

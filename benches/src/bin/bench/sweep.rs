@@ -2,6 +2,8 @@
 //!
 //! An object is a file of points, with or without a mesh, or a name that `Object::read` knows.
 
+use std::path::PathBuf;
+
 use nearmiss::{
     BuildOptions, CollideOptions, Detail, Evidence, GraphOptions, Metric, Order, Paths, PointKind, Scan,
 };
@@ -9,7 +11,7 @@ use nearmiss_benches::asked;
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::ours::Ours;
-use nearmiss_benches::rivals::{self, Method};
+use nearmiss_benches::rivals::{self, Method, program};
 use nearmiss_benches::sample::count;
 use nearmiss_benches::sweep::{self, Track};
 use nearmiss_benches::{Failure, machine, poses};
@@ -32,6 +34,9 @@ pub(crate) struct Options {
     /// A rival to measure beside; repeatable
     #[arg(long = "rival", value_name = "NAME", value_parser = rivals::NAMES)]
     rivals: Vec<String>,
+    /// A program that times rivals of other languages, built by `benches/rivals/build.sh`
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
     /// Also measure queries for a witness
     #[arg(long)]
     witness: bool,
@@ -105,12 +110,23 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     }
     let mut tracks = sweep::tracks(&methods);
     let warm = poses::sweep(20, options.seed, u64::from(u32::MAX));
+    let mut all = Vec::new();
     for number in 0..options.passes {
         let poses = poses::sweep(options.per_distance, options.seed, number);
         sweep::pass(&mut methods, &mut tracks, &poses, &warm);
+        all.extend(poses.into_iter().flatten());
     }
     let near = poses::near(&object, options.near, options.seed)?;
     sweep::near(&mut methods, &mut tracks, &near);
+    if let Some(program) = &options.program {
+        all.extend(near.iter().map(|near| near.pose));
+        let engines = program::run(program, &object, &all, false)?;
+        for engine in &engines {
+            println!("{} prepared in {:.0} ms", engine.name, engine.prepared);
+        }
+        let passes = usize::try_from(options.passes)?;
+        tracks.extend(engines.iter().map(|engine| Track::of_engine(engine, passes, options.per_distance)));
+    }
 
     println!(
         "## {}\n\n{} points, r {:.5}, {:.0} points a unit of volume; prepared in {time:.2?}; {} poses a \

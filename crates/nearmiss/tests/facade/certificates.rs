@@ -46,8 +46,9 @@ fn a_proof_covers_all_pairs_of_points() {
     let shape = sphere(1.0).sample(Sampling::clean(0.08));
     let scan = scan(&shape.points);
     let r = scorer_radius(&shape.points);
-    let plan = CollidePlan::new(&CollideOptions::estimated().with_evidence(Evidence::Certified), &scan, &scan)
-        .unwrap();
+    let plan =
+        CollidePlan::new(&CollideOptions::estimated().with_evidence(Evidence::Certified), &scan, &scan)
+            .unwrap();
     let mut rng = arbitrary::rng(3);
     let mut scratch = Scratch::default();
     let mut proof = Proof::default();

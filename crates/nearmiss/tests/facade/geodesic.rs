@@ -32,7 +32,8 @@ fn bytes(scan: &Scan) -> Vec<u8> {
 }
 
 fn ask(a: &Scan, b: &Scan, pose: &Pose, scratch: &mut Scratch) -> Verdict {
-    let plan = CollidePlan::new(&CollideOptions::estimated().with_semantics(Semantics::Surface), a, b).unwrap();
+    let plan =
+        CollidePlan::new(&CollideOptions::estimated().with_semantics(Semantics::Surface), a, b).unwrap();
     Pair::new(a.at(&Pose::IDENTITY), b.at(pose)).collide(&plan, scratch).verdict
 }
 
