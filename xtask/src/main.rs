@@ -71,7 +71,7 @@ const CHORES: [Chore; 12] = [
     ),
     (
         "tables",
-        "-o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--quick]",
+        "-o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--poses N] [--quick]",
         "Measure the tables and figures of Klein & Zachmann 2004 and 2005 and of Anjos et al. 2012",
     ),
     ("readers", "", "Install independent readers, whose points a test compares with ours"),

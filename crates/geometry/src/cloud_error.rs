@@ -21,7 +21,10 @@ pub enum CloudError {
         index: usize,
     },
     /// Too few distinct finite points.
-    #[error("expected at least 8 distinct finite points, got {distinct} (of {given} given)")]
+    #[error(
+        "expected at least 8 distinct finite points, got {distinct} (of {given} given); give more points, or sample the \
+         surface of a mesh"
+    )]
     TooFew {
         /// Number of distinct finite points.
         distinct: usize,
