@@ -9,6 +9,7 @@ pub mod mesh;
 mod method;
 pub mod ours;
 pub mod parry;
+pub mod refit;
 pub mod triangles;
 pub mod trimesh;
 
