@@ -13,9 +13,8 @@ use crate::tree::KineticTree;
 /// The most points of a primitive.
 pub(crate) const MOST_CORNERS: usize = 1024;
 
-/// Points that a leaf should have about: fewer would make more nodes, more would be compared at
-/// each event.
-const LEAF_POINTS: usize = 8;
+/// Primitives of a leaf. Smaller leaves make more nodes, larger ones more comparisons at each event.
+const LEAF_SIZE: usize = 4;
 
 /// A primitive and its centre.
 #[derive(Debug, Clone, Copy)]
@@ -24,13 +23,9 @@ pub(crate) struct Item {
     centre: [f64; 3],
 }
 
-/// Returns the most primitives of a leaf.
-pub(crate) const fn leaf_size(arity: usize) -> usize {
-    match arity {
-        1 => LEAF_POINTS,
-        2..=4 => LEAF_POINTS / 2,
-        _ => 1,
-    }
+/// Returns the most primitives of a leaf. Those with many points have a leaf each.
+const fn leaf_size(arity: usize) -> usize {
+    if arity <= 4 { LEAF_SIZE } else { 1 }
 }
 
 impl KineticTree {
@@ -97,6 +92,7 @@ impl KineticTree {
             counts: Counts::default(),
             edits: 0,
             changes: None,
+            states: Vec::new(),
         })
     }
 
@@ -115,6 +111,9 @@ impl KineticTree {
     fn build(&mut self) {
         let all: Vec<u32> = (0..id32(self.primitives.slots())).collect();
         self.grow(ROOT, &all);
+        let mut order = Vec::with_capacity(all.len());
+        self.nodes.list(ROOT, &mut order);
+        self.points.arrange(order.iter().flat_map(|&primitive| self.primitives.points(primitive)).copied());
         self.refresh();
         self.counts = Counts::default();
     }
@@ -151,7 +150,8 @@ impl KineticTree {
         }
         let length = extent.map(|[least, greatest]| greatest - least);
         let axis = (1..3).fold(0, |a, b| if length[b] > length[a] { b } else { a });
-        let half = items.len().div_ceil(2);
+        // Leaves are full but for one.
+        let half = (items.len() / 2).next_multiple_of(self.nodes.leaf_size);
         items.select_nth_unstable_by(half, |a, b| {
             a.centre[axis].total_cmp(&b.centre[axis]).then(a.primitive.cmp(&b.primitive))
         });

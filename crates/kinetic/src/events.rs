@@ -1,7 +1,7 @@
 //! Certificates, the events at which they fail, and the refreshing of boxes after other changes.
 
 use crate::error::KineticError;
-use crate::motion::later;
+use crate::motion::{State, later};
 use crate::nodes::{DIRTY, FRESH, ROOT, SIDES};
 use crate::plan::seconds;
 use crate::points::Side;
@@ -105,48 +105,27 @@ impl KineticTree {
 
     /// Computes the certificate of a side: the rival that overtakes the extremal point first.
     fn certify(&mut self, at: u32, side: Side) {
-        self.counts.certificates += 1;
         let now = self.clock;
         let node = self.nodes.get(at);
         let winner = node.winners[side];
+        let state = |slot| self.points.state(slot, side, now);
         let (rival, wait) = if node.is_leaf() {
-            self.first_rival(at, winner, side)
+            let slots = self.nodes.points_of(at);
+            first_rival(winner, state(winner), slots.iter().map(|&slot| (slot, state(slot))))
         } else {
             let [a, b] = [node.children, node.children + 1].map(|child| self.nodes.get(child).winners[side]);
             let rival = if a == winner { b } else { a };
-            let state = |point| self.points.state(point, side, now);
             (rival, if rival == winner { f64::INFINITY } else { state(winner).overtaken_in(&state(rival)) })
         };
+        self.set_certificate(at, side, rival, wait);
+    }
+
+    fn set_certificate(&mut self, at: u32, side: Side, rival: u32, wait: f64) {
+        self.counts.certificates += 1;
+        let now = self.clock;
         let node = self.nodes.get_mut(at);
         node.times[side] = later(now, wait);
         node.rivals[side] = rival;
-    }
-
-    /// Returns the point of a leaf that overtakes `winner` first, and the seconds until then. At
-    /// equal times it is the point that gains most, of equal ones that of the lowest index.
-    fn first_rival(&self, leaf: u32, winner: u32, side: Side) -> (u32, f64) {
-        let mut best = (NONE, f64::INFINITY);
-        if winner == NONE {
-            return best;
-        }
-        let state = |point| self.points.state(point, side, self.clock);
-        let ahead = state(winner);
-        for &point in self.nodes.points_of(leaf) {
-            if point == winner {
-                continue;
-            }
-            let rival = state(point);
-            let wait = ahead.overtaken_in(&rival);
-            let is_better = wait < best.1
-                || (wait == best.1 && wait < f64::INFINITY && {
-                    let other = state(best.0);
-                    rival.gains_on(&other) || (point < best.0 && !other.gains_on(&rival))
-                });
-            if is_better {
-                best = (point, wait);
-            }
-        }
-        best
     }
 
     /// Notes that the plan of a point changed. [`Self::refresh`] has to follow.
@@ -171,11 +150,13 @@ impl KineticTree {
         self.nodes.get_mut(at).flags &= !(DIRTY | FRESH);
         let is_fresh = flags & FRESH != 0;
         let children = self.nodes.get(at).children;
+        let old = self.nodes.get(at).winners;
         let mut sides = ALL_SIDES;
         if children == 0 {
             if is_fresh {
                 self.list_points(at);
             }
+            self.refresh_leaf(at);
         } else {
             let mut below = 0;
             for child in [children, children + 1] {
@@ -186,25 +167,17 @@ impl KineticTree {
             if !is_fresh {
                 sides = below;
             }
+            self.refresh_inner(at, sides);
         }
-        let mut changed = 0;
+        let new = &self.nodes.get(at).winners;
+        let [mut other, mut changed] = [0, 0];
         for side in (0..SIDES).filter(|side| sides & 1 << side != 0) {
-            let best = if children == 0 {
-                let points = self.nodes.points_of(at).iter().copied();
-                points.reduce(|a, b| self.points.extremal(a, b, side, self.clock)).unwrap_or(NONE)
-            } else {
-                let [a, b] = [children, children + 1].map(|child| self.nodes.get(child).winners[side]);
-                self.points.extremal(a, b, side, self.clock)
-            };
-            let winner = std::mem::replace(&mut self.nodes.get_mut(at).winners[side], best);
-            if winner != best {
-                self.counts.updates += u64::from(!is_fresh);
-            }
-            if winner != best || (best != NONE && self.points.has_changed(best)) {
-                changed |= 1 << side;
-            }
-            self.certify(at, side);
+            let is_other = new[side] != old[side];
+            other |= u8::from(is_other) << side;
+            changed |=
+                u8::from(is_other || (new[side] != NONE && self.points.has_changed(new[side]))) << side;
         }
+        self.counts.updates += if is_fresh { 0 } else { u64::from(other.count_ones()) };
         self.nodes.compare(at);
         if let Some(changes) = &mut self.changes
             && changed != 0
@@ -212,6 +185,45 @@ impl KineticTree {
             changes.push((at, changed));
         }
         if is_fresh { ALL_SIDES } else { changed }
+    }
+
+    /// Computes some sides of an inner node.
+    fn refresh_inner(&mut self, at: u32, sides: u8) {
+        let children = self.nodes.get(at).children;
+        for side in (0..SIDES).filter(|side| sides & 1 << side != 0) {
+            let [a, b] = [children, children + 1].map(|child| self.nodes.get(child).winners[side]);
+            let states = [a, b].map(|slot| self.points.state(slot, side, self.clock));
+            let is_first = is_extremal((a, &states[0]), (b, &states[1]));
+            let (winner, rival) = if is_first { (a, b) } else { (b, a) };
+            let [ahead, behind] = if is_first { states } else { [states[1], states[0]] };
+            self.nodes.get_mut(at).winners[side] = winner;
+            let wait = if a == b { f64::INFINITY } else { ahead.overtaken_in(&behind) };
+            self.set_certificate(at, side, rival, wait);
+        }
+    }
+
+    /// Computes all sides of a leaf.
+    fn refresh_leaf(&mut self, leaf: u32) {
+        let mut states = std::mem::take(&mut self.states);
+        for axis in 0..3 {
+            states.clear();
+            let state = |&slot| (slot, self.points.state(slot, axis, self.clock));
+            states.extend(self.nodes.points_of(leaf).iter().map(state));
+            for side in [axis, axis + 3] {
+                let first = states
+                    .iter()
+                    .copied()
+                    .reduce(|a, b| if is_extremal((a.0, &a.1), (b.0, &b.1)) { a } else { b });
+                let rival = |(slot, ahead)| first_rival(slot, ahead, states.iter().copied());
+                let (rival, wait) = first.map_or((NONE, f64::INFINITY), rival);
+                self.nodes.get_mut(leaf).winners[side] = first.map_or(NONE, |(slot, _)| slot);
+                self.set_certificate(leaf, side, rival, wait);
+                for (_, state) in &mut states {
+                    *state = state.reversed();
+                }
+            }
+        }
+        self.states = states;
     }
 
     /// Lists the points of the primitives of a leaf, each of them once.
@@ -226,8 +238,9 @@ impl KineticTree {
         let mut count = 0;
         for i in first..first + node.size as usize {
             for &point in self.primitives.points(self.nodes.primitives[i]) {
-                if !self.nodes.points[start..start + count].contains(&point) {
-                    self.nodes.points[start + count] = point;
+                let slot = self.points.slot(point);
+                if !self.nodes.points[start..start + count].contains(&slot) {
+                    self.nodes.points[start + count] = slot;
                     count += 1;
                 }
             }
@@ -235,4 +248,31 @@ impl KineticTree {
         let node = self.nodes.get_mut(leaf);
         node.flags = node.flags & (DIRTY | FRESH) | 4 * nearmiss_lanes::id32(count);
     }
+}
+
+/// Returns `true` if `a` is extremal beside `b`, from now on. Ties of position, velocity and
+/// acceleration go to the lower slot.
+fn is_extremal(a: (u32, &State), b: (u32, &State)) -> bool {
+    a.1.is_ahead_of(b.1) || (a.0 < b.0 && !b.1.is_ahead_of(a.1))
+}
+
+/// Returns the point that overtakes `winner` first, and the seconds until then. At equal times it is
+/// the point that gains most, of equal ones that of the lowest slot.
+fn first_rival(winner: u32, ahead: State, all: impl Iterator<Item = (u32, State)>) -> (u32, f64) {
+    let mut best = (NONE, f64::INFINITY);
+    let mut best_state = ahead;
+    for (slot, rival) in all {
+        if slot == winner {
+            continue;
+        }
+        let wait = ahead.overtaken_in(&rival);
+        let is_better = wait < best.1
+            || (wait == best.1
+                && wait < f64::INFINITY
+                && (rival.gains_on(&best_state) || (slot < best.0 && !best_state.gains_on(&rival))));
+        if is_better {
+            (best, best_state) = ((slot, wait), rival);
+        }
+    }
+    best
 }

@@ -25,6 +25,7 @@ const VERSION: u32 = 1;
 /// The most primitives of a leaf in a file.
 const MOST_IN_LEAF: usize = 64;
 
+/// Part 0 holds the present leg in each slot, part 1 the slot of each point.
 const LEGS: [u8; 4] = *b"LEGS";
 /// Part 0 holds the point of each leg to come, part 1 the legs.
 const LATER: [u8; 4] = *b"LATR";
@@ -71,14 +72,14 @@ impl KineticTree {
             leaf_size: id32(self.nodes.leaf_size),
             counts: self.counts,
         };
-        let legs = self.points.later.values().flatten().copied();
-        let later: Vec<Leg> = legs.collect();
-        let of = self.points.later.iter().flat_map(|(&point, legs)| legs.iter().map(move |_| point));
+        let later: Vec<Leg> = self.points.later.iter().flatten().copied().collect();
+        let of = (0..).zip(&self.points.later).flat_map(|(point, legs)| legs.iter().map(move |_| point));
         let of: Vec<u32> = of.collect();
         let mut writer = Writer::new(KIND, VERSION);
         writer
             .metadata(&about)?
             .section(LEGS, 0, &self.points.legs)?
+            .section(LEGS, 1, &self.points.slots)?
             .section(LATER, 0, &of)?
             .section(LATER, 1, &later)?
             .section(CORNERS, 0, &self.primitives.corners)?
@@ -139,7 +140,8 @@ impl KineticTree {
         let whole = blocks.checked_mul(nodes.leaf_points).filter(|&count| count <= MOST);
         nodes.points = vec![NONE; whole.ok_or(KineticError::TooMany)?];
         let counts = about.counts;
-        let mut tree = Self { clock, points, primitives, nodes, counts, edits: 0, changes: None };
+        let mut tree =
+            Self { clock, points, primitives, nodes, counts, edits: 0, changes: None, states: Vec::new() };
         tree.check()?;
         Ok(tree)
     }
@@ -225,13 +227,19 @@ fn load_points(file: &File, clock: f64) -> Result<Points, KineticError> {
     let mut points = Points::default();
     points.legs = file.array(LEGS, 0)?.to_vec();
     let count = points.legs.len();
-    require(count <= MOST, "number of points", count)?;
+    points.slots = file.array(LEGS, 1)?.to_vec();
+    require(count <= MOST && points.slots.len() == count, "number of points", count)?;
+    let mut unused = Marks(vec![false; count]);
+    for (i, &slot) in points.slots.iter().enumerate() {
+        unused.take(slot as usize, "place of point", i)?;
+    }
     points.free = file.array(FREE, 0)?.to_vec();
     let mut unused = Marks(vec![false; count]);
     for &point in &points.free {
         unused.take(point as usize, "free point", point as usize)?;
     }
-    for (i, leg) in points.legs.iter().enumerate() {
+    for i in 0..count {
+        let leg = points.leg(id32(i));
         let is_right = if unused.0[i] { leg[0].start.is_nan() } else { is_valid(leg) };
         require(is_right, "plan of point", i)?;
     }
@@ -242,7 +250,10 @@ fn load_points(file: &File, clock: f64) -> Result<Points, KineticError> {
         let ascends = i == 0 || of[i - 1] < point;
         let follows = i > 0 && of[i - 1] == point && leg[0].start < legs[i - 1][0].start;
         require(ascends || follows, "leg to come", i)?;
-        points.later.entry(point).or_default().push(*leg);
+        if points.later.len() <= point as usize {
+            points.later.resize(point as usize + 1, Vec::new());
+        }
+        points.later[point as usize].push(*leg);
         points.knots.set(point, leg[0].start);
     }
     Ok(points)

@@ -45,6 +45,11 @@ fn exceeds(a: &[f64], b: &[f64]) -> bool {
 }
 
 impl State {
+    /// Returns the state towards the opposite side.
+    pub(crate) fn reversed(self) -> Self {
+        Self(self.0.map(|x| -x))
+    }
+
     /// Returns `true` if this coordinate is ahead now, or is about to be: ties of positions are
     /// broken by velocities, then by accelerations.
     #[inline]

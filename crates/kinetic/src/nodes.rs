@@ -33,9 +33,9 @@ pub(crate) struct Node {
     pub(crate) first_at: u32,
     /// The node above; [`NONE`] for the root.
     pub(crate) parent: u32,
-    /// The extremal point of each side; [`NONE`] in an empty tree.
+    /// The slot of the extremal point of each side; [`NONE`] in an empty tree.
     pub(crate) winners: [u32; SIDES],
-    /// The point that overtakes it when the certificate fails.
+    /// The slot of the point that overtakes it when the certificate fails.
     pub(crate) rivals: [u32; SIDES],
     /// The first of the two nodes below; 0 for a leaf.
     pub(crate) children: u32,
@@ -87,7 +87,7 @@ pub(crate) struct Nodes {
     pub(crate) leaf_points: usize,
     /// The primitives of each leaf, `leaf_size` numbers each.
     pub(crate) primitives: Vec<u32>,
-    /// The points of each leaf, each of them once, `leaf_points` numbers each.
+    /// The slots of the points of each leaf, each of them once, `leaf_points` numbers each.
     pub(crate) points: Vec<u32>,
     /// Blocks of leaves that are unused.
     pub(crate) free_blocks: Vec<u32>,
@@ -122,7 +122,7 @@ impl Nodes {
         &self.primitives[start..start + node.size as usize]
     }
 
-    /// Returns the points of a leaf, each of them once.
+    /// Returns the slots of the points of a leaf, each of them once.
     #[inline]
     pub(crate) fn points_of(&self, leaf: u32) -> &[u32] {
         let node = self.get(leaf);
@@ -162,6 +162,16 @@ impl Nodes {
         node.children = children;
         node.flags &= DIRTY | FRESH;
         children
+    }
+
+    /// Appends the primitives below a node, in the order of the leaves.
+    pub(crate) fn list(&self, node: u32, found: &mut Vec<u32>) {
+        let children = self.get(node).children;
+        if children == 0 {
+            return found.extend_from_slice(self.primitives_of(node));
+        }
+        self.list(children, found);
+        self.list(children + 1, found);
     }
 
     /// Makes a leaf of a node, appending the primitives below it to `found`.

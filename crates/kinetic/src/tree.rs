@@ -4,6 +4,7 @@ use nearmiss_geometry::Aabb;
 
 use crate::counts::Counts;
 use crate::error::KineticError;
+use crate::motion::State;
 use crate::nodes::{Nodes, ROOT};
 use crate::plan::FlightPlan;
 use crate::points::{Points, Side};
@@ -36,6 +37,8 @@ pub struct KineticTree {
     /// The sides of nodes whose extremal points, or their plans, changed, if a separation list
     /// wants to know.
     pub(crate) changes: Option<Vec<(u32, u8)>>,
+    /// The points of a leaf that is refreshed; empty otherwise.
+    pub(crate) states: Vec<(u32, State)>,
 }
 
 impl KineticTree {
@@ -100,6 +103,7 @@ impl KineticTree {
     #[must_use]
     pub fn certificates_of(&self, point: u32) -> usize {
         let mut count = 0;
+        let Some(&slot) = self.points.slots.get(point as usize) else { return 0 };
         let mut leaves: Vec<u32> =
             self.primitives.of(point).map(|p| self.primitives.leaves[p as usize]).collect();
         leaves.sort_unstable();
@@ -108,7 +112,7 @@ impl KineticTree {
             let mut at = leaf;
             count += 6;
             while self.nodes.get(at).parent != NONE {
-                count += self.nodes.get(at).winners.iter().filter(|&&winner| winner == point).count();
+                count += self.nodes.get(at).winners.iter().filter(|&&winner| winner == slot).count();
                 at = self.nodes.get(at).parent;
             }
         }
