@@ -136,9 +136,8 @@ impl KineticTree {
 
     fn grow_items(&mut self, at: u32, items: &mut [Item]) {
         self.counts.rebuilt += 1;
-        let node = self.nodes.get_mut(at);
-        node.size = id32(items.len());
-        node.flags |= FRESH | DIRTY;
+        self.nodes.link_mut(at).size = id32(items.len());
+        self.nodes.get_mut(at).flags |= FRESH | DIRTY;
         if items.len() <= self.nodes.leaf_size {
             return self.fill(at, items);
         }

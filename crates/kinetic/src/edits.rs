@@ -83,11 +83,11 @@ impl KineticTree {
         match self.resize(leaf, |size| size + 1) {
             Some(node) => {
                 // The primitive is in no leaf yet.
-                self.nodes.get_mut(leaf).size -= 1;
+                self.nodes.link_mut(leaf).size -= 1;
                 self.rebuild(node, vec![primitive]);
             }
             None => {
-                let place = self.nodes.get(leaf).size as usize - 1;
+                let place = self.nodes.link(leaf).size as usize - 1;
                 let start = self.nodes.block_of(leaf) as usize * self.nodes.leaf_size;
                 self.nodes.primitives[start + place] = primitive;
                 self.primitives.leaves[primitive as usize] = leaf;
@@ -111,7 +111,7 @@ impl KineticTree {
         self.primitives.remove(primitive);
         self.counts.removals += 1;
         let start = self.nodes.get(leaf).block as usize * self.nodes.leaf_size;
-        let end = start + self.nodes.get(leaf).size as usize;
+        let end = start + self.nodes.link(leaf).size as usize;
         let list = &mut self.nodes.primitives[start..end];
         if let Some(place) = list.iter().position(|&other| other == primitive) {
             list[place..].rotate_left(1);
@@ -128,13 +128,13 @@ impl KineticTree {
     /// Returns the leaf that `bounds` enlarges least, child by child.
     fn best_leaf(&self, bounds: &Aabb) -> u32 {
         let mut at = ROOT;
-        while !self.nodes.get(at).is_leaf() {
-            let children = self.nodes.get(at).children;
+        while !self.nodes.link(at).is_leaf() {
+            let children = self.nodes.link(at).children;
             let [a, b] = [children, children + 1].map(|child| {
                 let own = self.node_box(child);
                 let grown = |k: usize| bounds.max[k].max(own.max[k]) - bounds.min[k].min(own.min[k]);
                 let growth: f64 = (0..3).map(|k| grown(k) - (own.max[k] - own.min[k])).sum();
-                (growth, self.nodes.get(child).size)
+                (growth, self.nodes.link(child).size)
             });
             at = if b.0 < a.0 || (b.0 == a.0 && b.1 < a.1) { children + 1 } else { children };
         }
@@ -147,7 +147,7 @@ impl KineticTree {
         let mut worst = None;
         let mut at = leaf;
         while at != NONE {
-            let node = self.nodes.get_mut(at);
+            let node = self.nodes.link_mut(at);
             node.size = change(node.size);
             let parent = node.parent;
             if self.nodes.is_unbalanced(at) {

@@ -39,7 +39,7 @@ impl KineticTree {
     /// Moves the clock to the next event or leg, and processes it. There must be one.
     #[inline]
     pub(crate) fn step(&mut self) {
-        let event = self.nodes.get(ROOT).first;
+        let event = self.nodes.link(ROOT).first;
         match self.points.knots.first() {
             Some((knot, _)) if knot <= event => {
                 self.clock = self.clock.max(knot);
@@ -67,11 +67,11 @@ impl KineticTree {
     /// Processes the failure of the earliest certificate: the rival becomes extremal, in that node
     /// and in those above where its predecessor was.
     fn process(&mut self) {
-        let mut at = self.nodes.get(ROOT).first_at;
+        let mut at = self.nodes.link(ROOT).first_at;
         let node = self.nodes.get(at);
         let side = node.first_side();
         let (old, new) = (node.winners[side], node.rivals[side]);
-        if node.is_leaf() {
+        if self.nodes.link(at).is_leaf() {
             self.counts.leaf_events += 1;
         } else {
             self.counts.tree_events += 1;
@@ -86,10 +86,11 @@ impl KineticTree {
                     self.note_change(at, 1 << side);
                 }
                 self.certify(at, side);
+                self.nodes.retime(at);
             }
             self.counts.steps += 1;
             let is_moving = self.nodes.compare(at);
-            at = self.nodes.get(at).parent;
+            at = self.nodes.link(at).parent;
             if at == NONE || !(is_changing || is_moving) {
                 break;
             }
@@ -106,14 +107,14 @@ impl KineticTree {
     /// Computes the certificate of a side: the rival that overtakes the extremal point first.
     fn certify(&mut self, at: u32, side: Side) {
         let now = self.clock;
-        let node = self.nodes.get(at);
-        let winner = node.winners[side];
+        let winner = self.nodes.get(at).winners[side];
+        let children = self.nodes.link(at).children;
         let state = |slot| self.points.state(slot, side, now);
-        let (rival, wait) = if node.is_leaf() {
+        let (rival, wait) = if children == 0 {
             let slots = self.nodes.points_of(at);
             first_rival(winner, state(winner), slots.iter().map(|&slot| (slot, state(slot))))
         } else {
-            let [a, b] = [node.children, node.children + 1].map(|child| self.nodes.get(child).winners[side]);
+            let [a, b] = [children, children + 1].map(|child| self.nodes.get(child).winners[side]);
             let rival = if a == winner { b } else { a };
             (rival, if rival == winner { f64::INFINITY } else { state(winner).overtaken_in(&state(rival)) })
         };
@@ -149,7 +150,7 @@ impl KineticTree {
         let flags = self.nodes.get(at).flags;
         self.nodes.get_mut(at).flags &= !(DIRTY | FRESH);
         let is_fresh = flags & FRESH != 0;
-        let children = self.nodes.get(at).children;
+        let children = self.nodes.link(at).children;
         let old = self.nodes.get(at).winners;
         let mut sides = ALL_SIDES;
         if children == 0 {
@@ -178,6 +179,7 @@ impl KineticTree {
                 u8::from(is_other || (new[side] != NONE && self.points.has_changed(new[side]))) << side;
         }
         self.counts.updates += if is_fresh { 0 } else { u64::from(other.count_ones()) };
+        self.nodes.retime(at);
         self.nodes.compare(at);
         if let Some(changes) = &mut self.changes
             && changed != 0
@@ -189,7 +191,7 @@ impl KineticTree {
 
     /// Computes some sides of an inner node.
     fn refresh_inner(&mut self, at: u32, sides: u8) {
-        let children = self.nodes.get(at).children;
+        let children = self.nodes.link(at).children;
         for side in (0..SIDES).filter(|side| sides & 1 << side != 0) {
             let [a, b] = [children, children + 1].map(|child| self.nodes.get(child).winners[side]);
             let states = [a, b].map(|slot| self.points.state(slot, side, self.clock));
@@ -228,15 +230,15 @@ impl KineticTree {
 
     /// Lists the points of the primitives of a leaf, each of them once.
     pub(crate) fn list_points(&mut self, leaf: u32) {
-        let node = *self.nodes.get(leaf);
-        if node.size == 0 {
+        let (block, size) = (self.nodes.get(leaf).block as usize, self.nodes.link(leaf).size as usize);
+        if size == 0 {
             self.nodes.get_mut(leaf).flags &= DIRTY | FRESH;
             return;
         }
-        let start = node.block as usize * self.nodes.leaf_points;
-        let first = node.block as usize * self.nodes.leaf_size;
+        let start = block * self.nodes.leaf_points;
+        let first = block * self.nodes.leaf_size;
         let mut count = 0;
-        for i in first..first + node.size as usize {
+        for i in first..first + size {
             for &point in self.primitives.points(self.nodes.primitives[i]) {
                 let slot = self.points.slot(point);
                 if !self.nodes.points[start..start + count].contains(&slot) {
@@ -246,7 +248,7 @@ impl KineticTree {
             }
         }
         let node = self.nodes.get_mut(leaf);
-        node.flags = node.flags & (DIRTY | FRESH) | 4 * nearmiss_lanes::id32(count);
+        node.flags = (node.flags & (DIRTY | FRESH)) | (4 * nearmiss_lanes::id32(count));
     }
 }
 

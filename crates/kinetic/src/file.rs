@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::build::MOST_CORNERS;
 use crate::counts::Counts;
 use crate::error::KineticError;
-use crate::nodes::{Node, Nodes, ROOT, SIDES};
+use crate::nodes::{Node, Nodes, ROOT, SIDES, Siblings};
 use crate::plan::{Leg, is_valid, seconds};
 use crate::points::{MOST, Points};
 use crate::primitives::{NONE, Primitives};
@@ -30,6 +30,7 @@ const LEGS: [u8; 4] = *b"LEGS";
 /// Part 0 holds the point of each leg to come, part 1 the legs.
 const LATER: [u8; 4] = *b"LATR";
 const CORNERS: [u8; 4] = *b"CORN";
+/// Part 0 holds extremal points and certificates, part 1 links.
 const NODES: [u8; 4] = *b"NODE";
 const LEAVES: [u8; 4] = *b"LEAF";
 /// Unused indices of points, primitives, pairs of nodes and leaves.
@@ -84,6 +85,7 @@ impl KineticTree {
             .section(LATER, 1, &later)?
             .section(CORNERS, 0, &self.primitives.corners)?
             .section(NODES, 0, &self.nodes.nodes)?
+            .section(NODES, 1, &self.nodes.links)?
             .section(LEAVES, 0, &self.nodes.primitives)?
             .section(FREE, 0, &self.points.free)?
             .section(FREE, 1, &self.primitives.free)?
@@ -129,10 +131,11 @@ impl KineticTree {
         primitives.free = free(1)?.to_vec();
         let mut nodes = Nodes::new(leaf_size, arity);
         nodes.nodes = file.array::<Node>(NODES, 0)?.to_vec();
+        nodes.links = file.array::<Siblings>(NODES, 1)?.to_vec();
         nodes.primitives = file.array(LEAVES, 0)?.to_vec();
         nodes.free_pairs = free(2)?.to_vec();
         nodes.free_blocks = free(3)?.to_vec();
-        let is_whole = nodes.nodes.len() >= 2 && nodes.nodes.len().is_multiple_of(2);
+        let is_whole = !nodes.links.is_empty() && nodes.nodes.len() == 2 * nodes.links.len();
         require(is_whole && nodes.nodes.len() <= MOST, "number of nodes", nodes.nodes.len())?;
         let blocks = nodes.primitives.len() / leaf_size;
         let is_whole = blocks * leaf_size == nodes.primitives.len() && blocks <= MOST;
@@ -169,27 +172,28 @@ impl KineticTree {
     /// Checks the topology at and below a node. Its height is limited, because each node must be
     /// balanced.
     fn check_below(&mut self, at: u32, parent: u32, unused: &mut Unused) -> Result<(), KineticError> {
-        let (index, node) = (at as usize, *self.nodes.get(at));
+        let (index, node) = (at as usize, *self.nodes.link(at));
         require(node.parent == parent, "parent of node", index)?;
         if !node.is_leaf() {
             unused.pairs.take(node.children as usize / 2, "children of node", index)?;
             require(node.children.is_multiple_of(2) && node.children > 0, "children of node", index)?;
-            let sizes = [node.children, node.children + 1].map(|child| u64::from(self.nodes.get(child).size));
+            let sizes =
+                [node.children, node.children + 1].map(|child| u64::from(self.nodes.link(child).size));
             require(sizes[0] + sizes[1] == u64::from(node.size), "size of node", index)?;
             require(!self.nodes.is_unbalanced(at), "size of node", index)?;
-            let node = self.nodes.get_mut(at);
-            (node.flags, node.block) = (0, NONE);
-            let children = node.children;
-            self.check_below(children, at, unused)?;
-            return self.check_below(children + 1, at, unused);
+            let place = self.nodes.get_mut(at);
+            (place.flags, place.block) = (0, NONE);
+            self.check_below(node.children, at, unused)?;
+            return self.check_below(node.children + 1, at, unused);
         }
         let is_small = node.size as usize <= self.nodes.leaf_size && (node.size > 0 || at == ROOT);
         require(is_small, "size of leaf", index)?;
         self.nodes.get_mut(at).flags = 0;
-        if node.block == NONE {
+        let block = self.nodes.get(at).block;
+        if block == NONE {
             return require(node.size == 0, "size of leaf", index);
         }
-        unused.blocks.take(node.block as usize, "place of leaf", index)?;
+        unused.blocks.take(block as usize, "place of leaf", index)?;
         for i in 0..node.size as usize {
             let primitive = self.nodes.primitives_of(at)[i] as usize;
             unused.primitives.take(primitive, "primitive of leaf", index)?;
@@ -200,23 +204,24 @@ impl KineticTree {
 
     /// Checks the extremal points and certificates at and below a node of a valid topology.
     fn check_certificates(&mut self, at: u32) -> Result<(), KineticError> {
-        let node = *self.nodes.get(at);
-        if node.is_leaf() {
+        let (node, link) = (*self.nodes.get(at), *self.nodes.link(at));
+        if link.is_leaf() {
             self.list_points(at);
         } else {
-            self.check_certificates(node.children)?;
-            self.check_certificates(node.children + 1)?;
+            self.check_certificates(link.children)?;
+            self.check_certificates(link.children + 1)?;
         }
         for side in 0..SIDES {
             let (winner, time) = (node.winners[side], node.times[side]);
             require(time >= self.clock, "time of a certificate of node", at as usize)?;
-            let among = [node.children, node.children + 1].map(|child| self.nodes.get(child).winners[side]);
-            let among = if node.is_leaf() { self.nodes.points_of(at) } else { &among };
-            let is_known = if node.size == 0 { winner == NONE } else { among.contains(&winner) };
+            let among = [link.children, link.children + 1].map(|child| self.nodes.get(child).winners[side]);
+            let among = if link.is_leaf() { self.nodes.points_of(at) } else { &among };
+            let is_known = if link.size == 0 { winner == NONE } else { among.contains(&winner) };
             require(is_known, "extremal point of node", at as usize)?;
             let is_known = time == f64::INFINITY || among.contains(&node.rivals[side]);
             require(is_known, "rival of an extremal point of node", at as usize)?;
         }
+        self.nodes.retime(at);
         self.nodes.compare(at);
         Ok(())
     }

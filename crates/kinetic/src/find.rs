@@ -75,7 +75,7 @@ impl KineticTree {
     }
 
     fn cast(&self, at: u32, ray: &mut Ray, visit: &mut impl FnMut(u32, f64) -> f64) {
-        let node = self.nodes.get(at);
+        let node = self.nodes.link(at);
         if node.is_leaf() {
             for &primitive in self.nodes.primitives_of(at) {
                 if let Some(enter) = self.primitive_bounds(primitive).and_then(|own| ray.enters(&own)) {
@@ -104,7 +104,7 @@ impl KineticTree {
     }
 
     fn find_below(&self, at: u32, wanted: &impl Fn(&Aabb) -> bool, visit: &mut impl FnMut(u32)) {
-        let node = self.nodes.get(at);
+        let node = self.nodes.link(at);
         if !wanted(&self.node_box(at)) {
             return;
         }

@@ -1,7 +1,8 @@
 //! `Nodes`: the nodes of a tree, with the extremal points and certificates of each, and the leaves.
 //!
 //! The tree is its own event queue: each node knows the earliest event at or below it. An event
-//! changes nodes on the way to the root only, and that way is also where the queue changes.
+//! changes nodes on the way to the root only, and that way is also where the queue changes. It reads
+//! one cache line for each node on it.
 
 use bytemuck::{Pod, Zeroable};
 use nearmiss_lanes::id32;
@@ -21,26 +22,51 @@ pub(crate) const DIRTY: u32 = 1;
 /// A flag of a node that all its sides must be computed.
 pub(crate) const FRESH: u32 = 2;
 
-/// A node: six extremal points and six certificates. The first cache line is the queue.
-#[repr(C, align(64))]
+/// The part of a node that the queue and the way to the root need.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct Node {
-    /// When the certificate of each side fails, in seconds; infinite if never.
-    pub(crate) times: [f64; SIDES],
+pub(crate) struct Link {
+    /// The earliest failure of a certificate of this node, in seconds; infinite if there is none.
+    pub(crate) own: f64,
     /// The earliest failure at or below this node.
     pub(crate) first: f64,
     /// The node of that failure.
     pub(crate) first_at: u32,
     /// The node above; [`NONE`] for the root.
     pub(crate) parent: u32,
-    /// The slot of the extremal point of each side; [`NONE`] in an empty tree.
-    pub(crate) winners: [u32; SIDES],
-    /// The slot of the point that overtakes it when the certificate fails.
-    pub(crate) rivals: [u32; SIDES],
     /// The first of the two nodes below; 0 for a leaf.
     pub(crate) children: u32,
     /// The number of primitives below.
     pub(crate) size: u32,
+}
+
+impl Link {
+    /// A leaf with nothing in it.
+    const EMPTY: Self =
+        Self { own: f64::INFINITY, first: f64::INFINITY, first_at: ROOT, parent: NONE, children: 0, size: 0 };
+
+    /// Returns `true` if the node has no children.
+    #[inline]
+    pub(crate) const fn is_leaf(&self) -> bool {
+        self.children == 0
+    }
+}
+
+/// Two siblings in one cache line.
+#[repr(C, align(64))]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Siblings([Link; 2]);
+
+/// The rest of a node: six extremal points and six certificates.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Node {
+    /// When the certificate of each side fails, in seconds; infinite if never.
+    pub(crate) times: [f64; SIDES],
+    /// The slot of the extremal point of each side; [`NONE`] in an empty tree.
+    pub(crate) winners: [u32; SIDES],
+    /// The slot of the point that overtakes it when the certificate fails.
+    pub(crate) rivals: [u32; SIDES],
     /// The place of a leaf's lists.
     pub(crate) block: u32,
     /// [`DIRTY`] and [`FRESH`]; of a leaf, also four times its number of points.
@@ -51,33 +77,29 @@ impl Node {
     /// A leaf with nothing in it.
     pub(crate) const EMPTY: Self = Self {
         times: [f64::INFINITY; SIDES],
-        first: f64::INFINITY,
-        first_at: ROOT,
-        parent: NONE,
         winners: [NONE; SIDES],
         rivals: [NONE; SIDES],
-        children: 0,
-        size: 0,
         block: NONE,
         flags: 0,
     };
-
-    /// Returns `true` if the node has no children.
-    #[inline]
-    pub(crate) const fn is_leaf(&self) -> bool {
-        self.children == 0
-    }
 
     /// Returns the side whose certificate fails first.
     #[inline]
     pub(crate) fn first_side(&self) -> Side {
         (1..SIDES).fold(0, |a, b| if self.times[b] < self.times[a] { b } else { a })
     }
+
+    /// Returns the time at which it fails.
+    #[inline]
+    fn first_time(&self) -> f64 {
+        self.times.iter().copied().fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// All nodes and leaves.
 #[derive(Debug, Clone)]
 pub(crate) struct Nodes {
+    pub(crate) links: Vec<Siblings>,
     pub(crate) nodes: Vec<Node>,
     /// Pairs of siblings that are unused, by the first of them.
     pub(crate) free_pairs: Vec<u32>,
@@ -97,8 +119,8 @@ impl Nodes {
     pub(crate) fn new(leaf_size: usize, arity: usize) -> Self {
         let [free_pairs, primitives, points, free_blocks] = [const { Vec::new() }; 4];
         let leaf_points = leaf_size * arity;
-        let nodes = vec![Node::EMPTY; 2];
-        Self { nodes, free_pairs, leaf_size, leaf_points, primitives, points, free_blocks }
+        let (links, nodes) = (vec![Siblings([Link::EMPTY; 2])], vec![Node::EMPTY; 2]);
+        Self { links, nodes, free_pairs, leaf_size, leaf_points, primitives, points, free_blocks }
     }
 
     #[inline]
@@ -111,15 +133,25 @@ impl Nodes {
         &mut self.nodes[node as usize]
     }
 
+    #[inline]
+    pub(crate) fn link(&self, node: u32) -> &Link {
+        &self.links[node as usize / 2].0[node as usize % 2]
+    }
+
+    #[inline]
+    pub(crate) fn link_mut(&mut self, node: u32) -> &mut Link {
+        &mut self.links[node as usize / 2].0[node as usize % 2]
+    }
+
     /// Returns the primitives of a leaf.
     #[inline]
     pub(crate) fn primitives_of(&self, leaf: u32) -> &[u32] {
-        let node = self.get(leaf);
-        if node.size == 0 {
+        let size = self.link(leaf).size as usize;
+        if size == 0 {
             return &[];
         }
-        let start = node.block as usize * self.leaf_size;
-        &self.primitives[start..start + node.size as usize]
+        let start = self.get(leaf).block as usize * self.leaf_size;
+        &self.primitives[start..start + size]
     }
 
     /// Returns the slots of the points of a leaf, each of them once.
@@ -153,20 +185,20 @@ impl Nodes {
         self.free_block(leaf);
         let children = self.free_pairs.pop().unwrap_or_else(|| {
             self.nodes.extend([Node::EMPTY; 2]);
+            self.links.push(Siblings([Link::EMPTY; 2]));
             id32(self.nodes.len() - 2)
         });
         for child in [children, children + 1] {
-            *self.get_mut(child) = Node { parent: leaf, first_at: child, ..Node::EMPTY };
+            *self.get_mut(child) = Node::EMPTY;
+            *self.link_mut(child) = Link { parent: leaf, first_at: child, ..Link::EMPTY };
         }
-        let node = self.get_mut(leaf);
-        node.children = children;
-        node.flags &= DIRTY | FRESH;
+        self.link_mut(leaf).children = children;
         children
     }
 
     /// Appends the primitives below a node, in the order of the leaves.
     pub(crate) fn list(&self, node: u32, found: &mut Vec<u32>) {
-        let children = self.get(node).children;
+        let children = self.link(node).children;
         if children == 0 {
             return found.extend_from_slice(self.primitives_of(node));
         }
@@ -176,7 +208,7 @@ impl Nodes {
 
     /// Makes a leaf of a node, appending the primitives below it to `found`.
     pub(crate) fn gather(&mut self, node: u32, found: &mut Vec<u32>) {
-        let children = self.get(node).children;
+        let children = self.link(node).children;
         if children == 0 {
             found.extend_from_slice(self.primitives_of(node));
             self.free_block(node);
@@ -184,7 +216,7 @@ impl Nodes {
             self.gather(children, found);
             self.gather(children + 1, found);
             self.free_pairs.push(children);
-            self.get_mut(node).children = 0;
+            self.link_mut(node).children = 0;
         }
     }
 
@@ -201,28 +233,32 @@ impl Nodes {
         self.get_mut(node).flags |= flags;
         let mut at = node;
         while at != NONE && self.get(at).flags & DIRTY == 0 {
-            let node = self.get_mut(at);
-            node.flags |= DIRTY;
-            at = node.parent;
+            self.get_mut(at).flags |= DIRTY;
+            at = self.link(at).parent;
         }
+    }
+
+    /// Notes that certificates of a node changed. [`Self::compare`] has to follow.
+    #[inline]
+    pub(crate) fn retime(&mut self, at: u32) {
+        self.link_mut(at).own = self.get(at).first_time();
     }
 
     /// Compares the earliest event of a node again; returns `true` if it changed.
     #[inline]
     pub(crate) fn compare(&mut self, at: u32) -> bool {
-        let node = self.get(at);
-        let mut best = (node.times.iter().copied().fold(f64::INFINITY, f64::min), at);
-        if !node.is_leaf() {
-            for child in [node.children, node.children + 1] {
-                let child = self.get(child);
+        let link = self.link(at);
+        let mut best = (link.own, at);
+        if !link.is_leaf() {
+            for child in &self.links[link.children as usize / 2].0 {
                 if child.first < best.0 {
                     best = (child.first, child.first_at);
                 }
             }
         }
-        let node = self.get_mut(at);
-        let is_new = (node.first, node.first_at) != best;
-        (node.first, node.first_at) = best;
+        let link = self.link_mut(at);
+        let is_new = (link.first, link.first_at) != best;
+        (link.first, link.first_at) = best;
         is_new
     }
 
@@ -230,11 +266,11 @@ impl Nodes {
     /// quarters, or one small leaf would do. So the height is at most log n / log (4/3) and a
     /// constant.
     pub(crate) fn is_unbalanced(&self, node: u32) -> bool {
-        let node = self.get(node);
+        let node = self.link(node);
         if node.is_leaf() {
             return node.size as usize > self.leaf_size;
         }
-        let sizes = [node.children, node.children + 1].map(|child| self.get(child).size);
+        let sizes = [node.children, node.children + 1].map(|child| self.link(child).size);
         let [least, most] = [sizes[0].min(sizes[1]), sizes[0].max(sizes[1])];
         least == 0 || 4 * u64::from(most) > 3 * u64::from(node.size) + 4 || self.fits_half_a_leaf(node.size)
     }
@@ -252,6 +288,6 @@ impl Nodes {
     pub(crate) const fn bytes(&self) -> usize {
         let words =
             self.primitives.len() + self.points.len() + self.free_pairs.len() + self.free_blocks.len();
-        self.nodes.len() * size_of::<Node>() + words * size_of::<u32>()
+        self.nodes.len() * (size_of::<Node>() + size_of::<Link>()) + words * size_of::<u32>()
     }
 }

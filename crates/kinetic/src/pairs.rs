@@ -29,16 +29,16 @@ impl View<'_> {
     }
 
     fn is_empty(&self, nodes: [u32; 2]) -> bool {
-        (0..2).any(|k| self.trees[k].nodes.get(nodes[k]).size == 0)
+        (0..2).any(|k| self.trees[k].nodes.link(nodes[k]).size == 0)
     }
 
     fn is_leaf(&self, tree: usize, nodes: [u32; 2]) -> bool {
-        self.trees[tree].nodes.get(nodes[tree]).is_leaf()
+        self.trees[tree].nodes.link(nodes[tree]).is_leaf()
     }
 
     /// Returns the tree whose node a pair splits: the one with more primitives.
     fn splits(&self, nodes: [u32; 2]) -> Option<usize> {
-        let size = |tree: usize| self.trees[tree].nodes.get(nodes[tree]).size;
+        let size = |tree: usize| self.trees[tree].nodes.link(nodes[tree]).size;
         match [0, 1].map(|tree| self.is_leaf(tree, nodes)) {
             [true, true] => None,
             [false, true] => Some(0),
@@ -61,7 +61,7 @@ struct NodePair {
     /// The first of the two pairs below; 0 if there are none.
     children: u32,
     /// The side on which the boxes are apart, or that will part first.
-    side: u8,
+    side: Side,
     /// The boxes have a point in common.
     meets: bool,
     /// The pairs after and before this one with the same node, for each tree.
@@ -112,7 +112,6 @@ impl Pairs {
     pub(crate) fn step(&mut self, view: View<'_>) {
         let Some((_, pair)) = self.queue.first() else { return };
         let NodePair { nodes, side, meets, .. } = self.pairs[pair as usize];
-        let side = Side::from(side);
         // The certificate decides about its own side, whatever rounding makes of the positions.
         let sides =
             (0..SIDES).filter(|&other| if other == side { meets } else { is_apart(view, nodes, other) });
@@ -129,7 +128,7 @@ impl Pairs {
         let mut at = self.heads[tree][node as usize];
         while at != NONE {
             let pair = &self.pairs[at as usize];
-            if pair.meets || sides & 1 << winner_side(tree, Side::from(pair.side)) != 0 {
+            if pair.meets || sides & 1 << winner_side(tree, pair.side) != 0 {
                 touched.push(at);
             }
             at = pair.next[tree];
@@ -157,7 +156,7 @@ impl Pairs {
     }
 
     /// Notes that a pair is apart on a side until `time`. The pairs below it are dropped.
-    fn part(&mut self, pair: u32, side: u8, time: f64) {
+    fn part(&mut self, pair: u32, side: Side, time: f64) {
         self.drop_below(pair);
         let found = &mut self.pairs[pair as usize];
         (found.side, found.meets) = (side, false);
@@ -180,7 +179,7 @@ impl Pairs {
             nearmiss_lanes::id32(self.pairs.len() - 2)
         });
         self.pairs[pair as usize].children = children;
-        let first = view.trees[tree].nodes.get(nodes[tree]).children;
+        let first = view.trees[tree].nodes.link(nodes[tree]).children;
         for k in 0..2 {
             let mut below = nodes;
             below[tree] = first + k;
@@ -270,19 +269,19 @@ fn is_apart(view: View<'_>, nodes: [u32; 2], side: Side) -> bool {
 }
 
 /// Returns the one of `sides` on which the boxes stay apart longest, and until when.
-fn last_to_meet(view: View<'_>, nodes: [u32; 2], sides: impl Iterator<Item = Side>) -> Option<(u8, f64)> {
+fn last_to_meet(view: View<'_>, nodes: [u32; 2], sides: impl Iterator<Item = Side>) -> Option<(Side, f64)> {
     let until = |side| {
         let [above, below] = view.bounds(nodes, side);
-        (side as u8, later(view.now, above.overtaken_in(&below)))
+        (side, later(view.now, above.overtaken_in(&below)))
     };
     sides.map(until).reduce(|a, b| if b.1 > a.1 { b } else { a })
 }
 
 /// Returns the side on which boxes that meet part first, and when.
-fn first_to_part(view: View<'_>, nodes: [u32; 2]) -> (u8, f64) {
+fn first_to_part(view: View<'_>, nodes: [u32; 2]) -> (Side, f64) {
     let when = |side| {
         let [above, below] = view.bounds(nodes, side);
-        (side as u8, later(view.now, below.overtaken_in(&above)))
+        (side, later(view.now, below.overtaken_in(&above)))
     };
     (1..SIDES).map(when).fold(when(0), |a, b| if b.1 < a.1 { b } else { a })
 }

@@ -6,7 +6,7 @@ use crate::tree::KineticTree;
 
 /// A time at which two primitives meet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Meeting {
+pub struct FirstContact {
     /// The time, in seconds.
     pub time: f64,
     /// A primitive of each tree.
@@ -14,7 +14,7 @@ pub struct Meeting {
 }
 
 /// The node pairs of two kinetic trees that are apart, each with a proof of that and the time until
-/// which it holds (a kinetic separation list, after Zachmann & Weller 2006).
+/// which it holds (a kinetic separation list, after Weller & Zachmann 2006).
 ///
 /// A collision test of two trees goes down from the roots and stops at pairs of boxes that are apart
 /// and at leaf pairs. The list holds exactly these pairs at every time. A pair that is apart has a
@@ -85,9 +85,9 @@ impl SeparationList {
         b: &mut KineticTree,
         until: f64,
         mut narrow: impl FnMut([&KineticTree; 2], [u32; 2], [f64; 2]) -> Option<f64>,
-    ) -> Result<Option<Meeting>, KineticError> {
+    ) -> Result<Option<FirstContact>, KineticError> {
         let until = self.start(a, b, until)?;
-        let mut best: Option<Meeting> = None;
+        let mut best: Option<FirstContact> = None;
         let mut now = a.clock;
         let mut found = std::mem::take(&mut self.found);
         self.pairs.refresh_all();
@@ -205,9 +205,9 @@ fn narrowed(
     trees: [&KineticTree; 2],
     leaves: [u32; 2],
     [from, to]: [f64; 2],
-    mut best: Option<Meeting>,
+    mut best: Option<FirstContact>,
     narrow: &mut impl FnMut([&KineticTree; 2], [u32; 2], [f64; 2]) -> Option<f64>,
-) -> Option<Meeting> {
+) -> Option<FirstContact> {
     let [of_a, of_b] = [0, 1].map(|k| trees[k].nodes.primitives_of(leaves[k]));
     for (&i, &j) in of_a.iter().flat_map(|i| of_b.iter().map(move |j| (i, j))) {
         let limit = best.map_or(to, |best| best.time.min(to));
@@ -215,7 +215,7 @@ fn narrowed(
             && time <= limit
             && best.is_none_or(|best| time < best.time)
         {
-            best = Some(Meeting { time: time.max(from), primitives: [i, j] });
+            best = Some(FirstContact { time: time.max(from), primitives: [i, j] });
         }
     }
     best
@@ -234,7 +234,7 @@ mod tests {
     fn front(trees: [&KineticTree; 2], nodes: [u32; 2], found: &mut Vec<([u32; 2], bool)>) {
         let [a, b] = [0, 1].map(|k| trees[k].node_box(nodes[k]));
         let meets = (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k]);
-        let of = [0, 1].map(|k| trees[k].nodes.get(nodes[k]));
+        let of = [0, 1].map(|k| trees[k].nodes.link(nodes[k]));
         let tree = usize::from(of[0].is_leaf() || (!of[1].is_leaf() && of[1].size > of[0].size));
         if !meets || of[tree].is_leaf() {
             return found.push((nodes, meets));

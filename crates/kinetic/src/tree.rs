@@ -85,7 +85,7 @@ impl KineticTree {
     }
 
     fn height_below(&self, at: u32) -> usize {
-        let node = self.nodes.get(at);
+        let node = self.nodes.link(at);
         if node.is_leaf() {
             return 1;
         }
@@ -111,9 +111,9 @@ impl KineticTree {
         for leaf in leaves {
             let mut at = leaf;
             count += 6;
-            while self.nodes.get(at).parent != NONE {
+            while self.nodes.link(at).parent != NONE {
                 count += self.nodes.get(at).winners.iter().filter(|&&winner| winner == slot).count();
-                at = self.nodes.get(at).parent;
+                at = self.nodes.link(at).parent;
             }
         }
         count
@@ -132,7 +132,7 @@ impl KineticTree {
     }
 
     fn visit_below(&self, at: u32, found: &mut Vec<u32>, visit: &mut impl FnMut(&Aabb, &[u32])) {
-        let (node, start) = (self.nodes.get(at), found.len());
+        let (node, start) = (self.nodes.link(at), found.len());
         if node.is_leaf() {
             found.extend_from_slice(self.nodes.primitives_of(at));
         } else {
@@ -201,7 +201,7 @@ impl KineticTree {
     #[inline]
     pub(crate) fn next_time(&self) -> f64 {
         let knot = self.points.knots.first().map_or(f64::INFINITY, |(time, _)| time);
-        self.nodes.get(ROOT).first.min(knot)
+        self.nodes.link(ROOT).first.min(knot)
     }
 
     /// Returns the time of the next event, or of the next leg of a plan; `None` if boxes will be

@@ -1,7 +1,7 @@
 //! Separation lists against loops over all pairs of primitives.
 
 use nearmiss_geometry::Aabb;
-use nearmiss_kinetic::{FlightPlan, KineticTree, Meeting, SeparationList};
+use nearmiss_kinetic::{FirstContact, FlightPlan, KineticTree, SeparationList};
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use rand::{Rng, RngExt};
 
@@ -119,7 +119,7 @@ fn contacts_are_the_earliest() {
         let mut list = SeparationList::new();
         let found = list.next_contact(&mut a, &mut b, 5.0, rigid).unwrap();
         match (found, expected) {
-            (Some(Meeting { time, primitives }), Some(expected)) => {
+            (Some(FirstContact { time, primitives }), Some(expected)) => {
                 hits += 1;
                 assert!((time - expected).abs() < 1e-9, "round {round}: {time}, {expected}");
                 assert_eq!(a.clock(), time, "the trees are at the contact");

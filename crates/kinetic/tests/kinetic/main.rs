@@ -1,4 +1,5 @@
 //! Tests of the kinetic tree, in one program so that they link once.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod model;
 
