@@ -10,6 +10,7 @@ mod method;
 pub mod ours;
 pub mod parry;
 pub mod program;
+pub mod refit;
 pub mod triangles;
 pub mod trimesh;
 

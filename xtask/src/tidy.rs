@@ -18,7 +18,7 @@ const COMMENT_WIDTH: usize = 110;
 const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 
 /// The members of the workspace that each crate may use; the table of ARCHITECTURE.md.
-const LAYERS: [(&str, &[&str]); 18] = [
+const LAYERS: [(&str, &[&str]); 19] = [
     ("nearmiss-geometry", &[]),
     ("nearmiss-lanes", &[]),
     ("nearmiss-index", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-store"]),
@@ -60,6 +60,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
             "nearmiss-mesh",
         ],
     ),
+    ("nearmiss-kinetic", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-store"]),
     ("nearmiss-mesh", &["nearmiss-geometry"]),
     ("nearmiss-slices", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-store", "nearmiss-mesh"]),
     (
@@ -75,6 +76,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
             "nearmiss-graph",
             "nearmiss-hierarchy",
             "nearmiss-query",
+            "nearmiss-kinetic",
             "nearmiss-mesh",
             "nearmiss-slices",
         ],

@@ -22,6 +22,8 @@ pub use nearmiss_hierarchy as hierarchy;
 pub use nearmiss_index as index;
 #[cfg(feature = "io")]
 pub use nearmiss_io as io;
+#[cfg(feature = "kinetic")]
+pub use nearmiss_kinetic as kinetic;
 #[cfg(feature = "mesh")]
 pub use nearmiss_mesh as mesh;
 pub use nearmiss_query as query;

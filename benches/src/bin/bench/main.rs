@@ -13,6 +13,7 @@ mod eigen;
 mod evaluation;
 mod geodesics;
 mod hints;
+mod kinetic;
 mod mesh_scans;
 mod meshes;
 mod reading;
@@ -60,6 +61,8 @@ enum Command {
     Geodesics(geodesics::Arguments),
     /// Time that hints save in small motions near contact
     Hints(hints::Arguments),
+    /// Kinetic trees: events, work, and refitting beside them
+    Kinetic(kinetic::Options),
     /// Meshes: preparing, exact and time-critical collision, distance
     Meshes(meshes::Options),
     /// An object's mesh against scans, beside its points
@@ -92,6 +95,7 @@ fn main() -> Result<(), Failure> {
         Command::Evaluation(arguments) => evaluation::run(&arguments),
         Command::Geodesics(arguments) => geodesics::run(&arguments),
         Command::Hints(arguments) => hints::run(&arguments),
+        Command::Kinetic(options) => kinetic::run(&options),
         Command::Meshes(options) => meshes::run(&options),
         Command::MeshScans(options) => mesh_scans::run(&options),
         Command::Reading(options) => reading::run(&options),
