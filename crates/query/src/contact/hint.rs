@@ -17,6 +17,7 @@ use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, Topology, descen
 use crate::ask::options::CollideOptions;
 use crate::contact::certificate::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::contact::search::{Closer, Surfaces};
+use crate::pair::pairing::Pairing;
 use crate::pair::scan_pair::ScanPair;
 
 /// A frontier that has grown to this many times its fresh length is dropped: its nodes are smaller

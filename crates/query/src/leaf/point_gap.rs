@@ -13,6 +13,7 @@ use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{NodePair, OrientedBox, Part, Relative, ScanArrays};
 use nearmiss_lanes::wide::{blocks_of, lanes_of, load};
 
+use crate::pair::pairing::Pairing;
 use crate::pair::scan_pair::ScanPair;
 
 /// Points of a leaf in lanes, in one of the two stored frames, with the reach of the obstacle about

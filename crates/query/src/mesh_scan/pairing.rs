@@ -2,14 +2,12 @@
 
 use fearless_simd::Level;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{NodePair, Part, ScanArrays};
+use nearmiss_hierarchy::{NodePair, Part, Relative, ScanArrays, Tree};
 
 use crate::leaf::point_gap::gap_of_leaf_and_box;
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
-use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
 use crate::pair::pairing::{ItemPair, Pairing};
-use crate::pair::relative_pose::RelativePose;
 
 impl Pairing for MeshScanPairing<'_> {
     #[inline(always)]
@@ -28,35 +26,20 @@ impl Pairing for MeshScanPairing<'_> {
     }
 
     #[inline(always)]
-    fn slack(&self) -> f32 {
-        self.relative.slack()
+    fn relative(&self) -> &Relative {
+        &self.relative
     }
 
-    fn to_world(&self) -> f64 {
-        self.scan.stored_to_world().scale()
-    }
-
-    fn relative_pose(&self, pose: &Pose) -> RelativePose {
-        let roots = [self.a.tree.root_box(), self.b.tree.root_box()];
-        RelativePose::new(roots, [self.scan.stored_to_world(), self.mesh.stored_to_world()], pose)
+    fn placed(&self) -> [&Pose; 2] {
+        [self.scan.stored_to_world(), self.mesh.stored_to_world()]
     }
 
     #[inline(always)]
-    fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
+    fn both<'t>(&self) -> [&'t Tree<'t>; 2]
     where
         Self: 't,
     {
-        Bounds { trees: [&self.a.tree, &self.b.tree], relative_pose, part: self.part }
-    }
-
-    #[inline(always)]
-    fn which_are_leaves(&self, pair: NodePair) -> [bool; 2] {
-        [self.a.tree.topology().is_leaf(pair.a), self.b.tree.topology().is_leaf(pair.b)]
-    }
-
-    fn are_leaves(&self, pair: NodePair) -> bool {
-        let [a, b] = [self.a.tree.topology(), self.b.tree.topology()];
-        a.has(pair.a) && b.has(pair.b) && self.which_are_leaves(pair) == [true; 2]
+        [&self.a.tree, &self.b.tree]
     }
 
     fn band_of(&self, nodes: NodePair) -> f64 {
