@@ -18,7 +18,7 @@ use crate::parse::parse_duration;
 use crate::picture::names;
 use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
-use crate::report::AnswerReport;
+use crate::answer_report::AnswerReport;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture, posing};
 

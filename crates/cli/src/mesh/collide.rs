@@ -95,7 +95,7 @@ pub(crate) fn run(args: &MeshCollideArgs) -> Result<(), CliError> {
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
             let mut log = PathLog::new(&args.path, csv)?;
-            question.answer_all(poses, &mut log, &mut results)?;
+            question.answer_all(poses, console, &mut log, &mut results)?;
             log.draw(&args.path, &names(args.pair.inputs()), 0.0)?;
             let unit = question.meshes.unit(&[Pose::IDENTITY; 2]);
             if args.json { Ok(()) } else { results.line(log.summary(unit, 0.0)) }
@@ -114,12 +114,16 @@ impl Question<'_> {
     fn answer_all(
         &self,
         poses: &mut PoseFile,
+        console: Console,
         log: &mut PathLog<'_>,
         results: &mut Results,
     ) -> Result<(), CliError> {
+        let _watch = poses.watch(console, results);
         let ask = |poses: &PoseFile, (line, text): &PoseLine, _: &mut Scratch| {
             let posed = poses.poses(*line, text, self.meshes.both())?;
-            Ok(self.ask(Some(*line), posed))
+            let asked = self.ask(Some(*line), posed);
+            poses.answered();
+            Ok(asked)
         };
         let is_last = |asked: &Asked| self.args.first && asked.answer.verdict.is_intersecting();
         answer_lines(poses, self.args.threads.unwrap_or(1), ask, is_last, |asked| {

@@ -1,8 +1,8 @@
 //! A scan and a mesh as a [`Pairing`].
 
 use fearless_simd::Level;
-use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{NodePair, Part, Relative, ScanArrays, Tree};
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::{NodePair, Part, Relative, Tree};
 
 use crate::leaf::point_gap::gap_of_leaf_and_box;
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
@@ -68,12 +68,9 @@ impl Pairing for MeshScanPairing<'_> {
 
     #[inline]
     fn gap_by_points(&self, pair: NodePair) -> Option<f32> {
-        let is_loose = |scan: &ScanArrays<'_>, leaf: NodeId| {
-            scan.leaves.is_loose(scan.tree.topology().leaf_number(leaf))
-        };
         match self.which_are_leaves(pair) {
             [true, true] => Some(self.gap_of_two_leaves(pair)),
-            [true, false] if is_loose(self.a, pair.a) => Some(self.gap_of_leaf_boxes(pair)),
+            [true, false] => Some(self.gap_of_leaf_boxes(pair)),
             _ => None,
         }
     }
