@@ -40,7 +40,10 @@ impl AsMeshName {
             ("--thickened", of_meshes && args.meaning.thickened.is_some()),
             ("--margin", of_meshes && args.margin > 0.0),
             ("--evidence", of_meshes && args.evidence.is_some()),
-            ("--detail", args.detail == DetailName::Manifold || of_meshes && args.detail == DetailName::Verdict),
+            (
+                "--detail",
+                args.detail == DetailName::Manifold || of_meshes && args.detail == DetailName::Verdict,
+            ),
             ("--order", of_papers || of_meshes && order.is_some()),
             ("--prove", args.prove.is_some()),
             ("--method", args.search.method != MethodName::Traversal),

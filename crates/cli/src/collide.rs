@@ -10,6 +10,7 @@ use nearmiss::{
     Evidence, Metric, Pose, Proof, Scan, Scratch, Verdict,
 };
 
+use crate::answer_report::AnswerReport;
 use crate::as_mesh::AsMeshName;
 use crate::bodies::{Bodies, Plan, Wanted};
 use crate::console::{self, Console, Results, now};
@@ -25,7 +26,6 @@ use crate::path_entry::{PathEntry, PathVerdict};
 use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
-use crate::answer_report::AnswerReport;
 use crate::search::SearchArgs;
 use crate::units::SizeCheck;
 use crate::viewpoint::ViewArgs;

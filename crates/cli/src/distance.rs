@@ -4,11 +4,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use nearmiss::{
-    Budget, Deadline, Distance, DistanceOptions, DistancePlan, Pose, Scan, Scratch, Semantics,
-};
+use nearmiss::{Budget, Deadline, Distance, DistanceOptions, DistancePlan, Pose, Scan, Scratch, Semantics};
 use serde::Serialize;
 
+use crate::answer_report::word;
 use crate::as_mesh::AsMeshName;
 use crate::bodies::Bodies;
 use crate::console::{Console, Results, now};
@@ -24,7 +23,6 @@ use crate::path_entry::{PathEntry, PathVerdict};
 use crate::picture::names;
 use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
-use crate::answer_report::word;
 use crate::sentence::{bracket, untold};
 use crate::units::SizeCheck;
 use crate::viewpoint::ViewArgs;

@@ -2,14 +2,14 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
-    Aabb, Answer, CollideOptions, Contact, Distance, Evidence, Method, Metric, Placed, PointKind, Reason, Semantics,
-    Verdict,
+    Aabb, Answer, CollideOptions, Contact, Distance, Evidence, Method, Metric, Placed, PointKind, Reason,
+    Semantics, Verdict,
 };
 
 use crate::advice;
+use crate::answer_report::word;
 use crate::digits::{percent, place, rough, rounded, rounded_down, short};
 use crate::picture::stored_index;
-use crate::answer_report::word;
 
 /// Returns the answer to a question with these `options`, as a sentence. It states a clearance only if
 /// `distance` is given: the proven gap of a verdict may be much smaller than the distance.
@@ -108,7 +108,9 @@ pub(crate) fn against_mesh(
             }
         }
         Verdict::Separated { gap, evidence } => no_contact((gap, evidence), options, distance, unit),
-        Verdict::Undecided(reason) => format!("Cannot tell: {}.", why(reason, [scan; 2], [letter; 2], options)),
+        Verdict::Undecided(reason) => {
+            format!("Cannot tell: {}.", why(reason, [scan; 2], [letter; 2], options))
+        }
     }
 }
 

@@ -95,22 +95,19 @@ impl MeshAnswerReport {
             MeshVerdict::Intersecting(contact) => Some(contact),
             _ => None,
         };
-        let (evidence, reason) = evidence_and_reason(&answer.verdict);
         let contacts = all.map(|(all, _)| all.reports());
+        let mut of_scans = AnswerReport::undecided(&answer.statistics, 0.0, micros);
+        of_scans.verdict = kind(&answer.verdict).word();
+        (of_scans.evidence, of_scans.reason) = evidence_and_reason(&answer.verdict);
+        of_scans.witness = contact.map(|contact| contact.point);
+        of_scans.normal_a = contact.map(|contact| contact.normals[0]);
+        of_scans.normal_b = contact.map(|contact| contact.normals[1]);
+        of_scans.gap = answer.verdict.is_separated().then_some(0.0);
+        of_scans.complete = all.map(|(_, complete)| complete);
+        of_scans.contact_count = contacts.as_ref().map(Vec::len);
+        of_scans.link = all.map(|(all, _)| all.link());
         Self {
-            answer: AnswerReport {
-                verdict: kind(&answer.verdict).word(),
-                evidence,
-                reason,
-                witness: contact.map(|contact| contact.point),
-                normal_a: contact.map(|contact| contact.normals[0]),
-                normal_b: contact.map(|contact| contact.normals[1]),
-                gap: answer.verdict.is_separated().then_some(0.0),
-                complete: all.map(|(_, complete)| complete),
-                contact_count: contacts.as_ref().map(Vec::len),
-                link: all.map(|(all, _)| all.link()),
-                ..AnswerReport::undecided(&answer.statistics, 0.0, micros)
-            },
+            answer: of_scans,
             probability: probability(answer),
             region: match answer.verdict {
                 MeshVerdict::Undecided(region) => Some(region),

