@@ -164,5 +164,5 @@ pub(crate) fn distance(
     let arrays = views.map(|view| view.scan().arrays());
     let part = plan.options.semantics.part();
     let pair = ScanPair::new(views, arrays.each_ref(), relative, meter, (level, part));
-    bound(pair, &pose, plan, budget, open, contact)
+    bound((pair, &pose), [0, 0], plan, budget, (open, contact)).0
 }

@@ -49,22 +49,25 @@ pub(crate) trait Measured: Pairing {
 }
 
 /// Bounds the distance of a pair, with the meaning of `plan`, within `budget`. `pose` is b's pose in
-/// a's stored frame.
+/// a's stored frame. Starts from the items `start`, and returns the nearest ones as well; those of a
+/// contact are not returned.
 pub(crate) fn bound<P: Measured>(
-    pair: P,
-    pose: &Pose,
+    (pair, pose): (P, &Pose),
+    start: [usize; 2],
     plan: &DistancePlan,
     budget: &Budget,
-    open: &mut Frontier,
-    contact: &mut ContactScratch,
-) -> Distance {
+    (open, contact): (&mut Frontier, &mut ContactScratch),
+) -> (Distance, [usize; 2]) {
     let relative_pose = pair.relative_pose(pose);
-    if let Semantics::Thickened(radius) = plan.options().semantics {
-        return Apart { plan, budget, search: Search::new(pair, &relative_pose, false) }.balls(radius, open);
-    }
-    // Enclosures prove nothing about geodesic surfaces.
-    let is_bounded = plan.options().metric != Some(Metric::Geodesic);
-    Apart { plan, budget, search: Search::new(pair, &relative_pose, is_bounded) }.surfaces(open, contact)
+    // Enclosures prove nothing about points alone, nor about geodesic surfaces.
+    let of_points = matches!(plan.options().semantics, Semantics::Thickened(_));
+    let is_bounded = !of_points && plan.options().metric != Some(Metric::Geodesic);
+    let mut apart = Apart { plan, budget, search: Search::new(pair, &relative_pose, start, is_bounded) };
+    let found = match plan.options().semantics {
+        Semantics::Thickened(radius) => apart.balls(radius, open),
+        _ => apart.surfaces(open, contact),
+    };
+    (found, apart.search.best.items)
 }
 
 /// The answer for an invalid pose. `points` are any of both.
@@ -90,7 +93,7 @@ struct Apart<'s, P> {
 
 impl<P: Measured> Apart<'_, P> {
     /// The distance of balls of this radius about the points.
-    fn balls(mut self, radius: f64, open: &mut Frontier) -> Distance {
+    fn balls(&mut self, radius: f64, open: &mut Frontier) -> Distance {
         let both = P::THICK * radius;
         self.search.near_enough = both;
         let flow = self.search.run(open);
@@ -107,7 +110,7 @@ impl<P: Measured> Apart<'_, P> {
         }
     }
 
-    fn surfaces(mut self, open: &mut Frontier, contact: &mut ContactScratch) -> Distance {
+    fn surfaces(&mut self, open: &mut Frontier, contact: &mut ContactScratch) -> Distance {
         let of_obstacles = self.of_obstacles();
         if of_obstacles {
             self.search.share = Some(1.0 - self.plan.options().relative);

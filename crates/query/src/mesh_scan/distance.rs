@@ -13,6 +13,7 @@ use crate::distance::{
 };
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh_scan::collide::{AskedOfMesh, collide};
+use crate::mesh_scan::hint::MeshScanHint;
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
 use crate::mesh_scan::plan::MeshScanPlan;
 use crate::pair::placed::{Placed, ViewScratch};
@@ -23,8 +24,8 @@ pub(crate) fn distance(
     (scan, mesh): (&Placed<'_>, &PlacedMesh<'_>),
     plan: &DistancePlan,
     budget: &Budget,
-    open: &mut Frontier,
-    contact: &mut ContactScratch,
+    (open, contact): (&mut Frontier, &mut ContactScratch),
+    hint: Option<&mut MeshScanHint>,
 ) -> Distance {
     let (a, b) = (scan.scan().arrays(), mesh.mesh().arrays());
     let semantics = plan.options().semantics;
@@ -34,7 +35,14 @@ pub(crate) fn distance(
         return unknown(points, [scan.scan().id(0), PointId(b.source[0])]);
     };
     let stored = pair.stored;
-    bound(pair, &stored, plan, budget, open, contact)
+    let (points, triangles) = (scan.scan().len(), mesh.mesh().len());
+    let known = hint.as_ref().and_then(|hint| hint.nearest).map(|near| near.map(|i| i as usize));
+    let start = known.filter(|&[i, j]| i < points && j < triangles).unwrap_or_default();
+    let (found, nearest) = bound((pair, &stored), start, plan, budget, (open, contact));
+    if let Some(hint) = hint {
+        hint.nearest = Some(nearest.map(nearmiss_lanes::id32));
+    }
+    found
 }
 
 impl Measured for MeshScanPairing<'_> {
@@ -52,7 +60,7 @@ impl Measured for MeshScanPairing<'_> {
 
     fn touches(&self, plan: &DistancePlan, budget: &Budget, scratch: &mut ContactScratch) -> Answer {
         let plan = MeshScanPlan::touching(plan);
-        collide(AskedOfMesh { scan: self.scan, mesh: self.mesh, plan: &plan, budget }, scratch, None)
+        collide(AskedOfMesh { scan: self.scan, mesh: self.mesh, plan: &plan, budget }, scratch, (None, None))
     }
 
     /// Only the point on the surface moves, towards the triangle nearest to the sample.
