@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::Command;
 
 use nearmiss::{
-    BuildOptions, Check, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Pair,
-    PairHint, PointCloud, Pose, Scan, Scratch,
+    BuildOptions, Check, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Mesh,
+    MeshBuildOptions, MeshScanPair, MeshScanPlan, Pair, PairHint, PointCloud, Pose, Scan, Scratch,
 };
 use nearmiss_testdata::arbitrary::{rng, unit_vector};
 use nearmiss_testdata::scanner::{self, Frame};
@@ -33,6 +33,12 @@ pub enum Scenario {
     Distance,
     /// Distances in the hall.
     HallDistance,
+    /// Certified verdicts of a scan against its mesh over the sweep.
+    MeshScan,
+    /// Distances of the same.
+    MeshScanDistance,
+    /// Distances of an object's mesh in the hall.
+    MeshHallDistance,
     /// Hinted verdicts of small steps near contact.
     Hinted,
     /// Views of scans.
@@ -45,13 +51,16 @@ pub enum Scenario {
 
 impl Scenario {
     /// All scenarios with their names.
-    pub const ALL: [(Self, &'static str); 10] = [
+    pub const ALL: [(Self, &'static str); 13] = [
         (Self::Sweep, "sweep"),
         (Self::Near, "near"),
         (Self::Certified, "certified"),
         (Self::Hall, "hall"),
         (Self::Distance, "distance"),
         (Self::HallDistance, "hall-distance"),
+        (Self::MeshScan, "mesh-scan"),
+        (Self::MeshScanDistance, "mesh-scan-distance"),
+        (Self::MeshHallDistance, "mesh-hall-distance"),
         (Self::Hinted, "hinted"),
         (Self::View, "view"),
         (Self::Open, "open"),
@@ -84,6 +93,9 @@ impl Scenario {
             Self::Hall => verdicts(&hall()?, &certified),
             Self::Distance => distances(&sweep()?),
             Self::HallDistance => distances(&hall()?),
+            Self::MeshScan => mesh_verdicts(&sweep()?, "dragon-23k", &certified),
+            Self::MeshScanDistance => mesh_distances(&sweep()?, "dragon-23k"),
+            Self::MeshHallDistance => mesh_distances(&hall()?, "dragon-5k"),
             Self::Hinted => hinted(&near()?, &quick),
             Self::View => {
                 let Case { scans, questions, .. } = sweep()?;
@@ -209,6 +221,40 @@ fn distances(case: &Case) -> Result<(), Failure> {
         for question in &case.questions {
             let [at_a, at_b] = &question.poses;
             std::hint::black_box(Pair::new(a.at(at_a), b.at(at_b)).distance(&plan, &mut scratch));
+        }
+    });
+    Ok(())
+}
+
+/// The mesh of an object, in the size of its scan in `case`.
+fn mesh(case: &Case, name: &str) -> Result<Mesh, Failure> {
+    let object = Object::read(name)?;
+    let object = if case.scans.len() == 1 { object.scaled()? } else { object };
+    let mesh = object.mesh.ok_or("expected an object with a mesh")?;
+    Ok(Mesh::build(&mesh, &MeshBuildOptions::default().with_threads(1))?)
+}
+
+/// Verdicts for the same questions, with a mesh for the last scan.
+fn mesh_verdicts(case: &Case, name: &str, options: &CollideOptions) -> Result<(), Failure> {
+    let (a, b) = (&case.scans[0], mesh(case, name)?);
+    let (plan, mut scratch) = (MeshScanPlan::new(options, a)?, Scratch::default());
+    counted(&mut || {
+        for question in &case.questions {
+            let [at_a, at_b] = &question.poses;
+            std::hint::black_box(MeshScanPair::new(a.at(at_a), b.at(at_b)).collide(&plan, &mut scratch));
+        }
+    });
+    Ok(())
+}
+
+fn mesh_distances(case: &Case, name: &str) -> Result<(), Failure> {
+    let (a, b) = (&case.scans[0], mesh(case, name)?);
+    let plan = DistancePlan::against_mesh(&DistanceOptions::default(), a)?;
+    let mut scratch = Scratch::default();
+    counted(&mut || {
+        for question in &case.questions {
+            let [at_a, at_b] = &question.poses;
+            std::hint::black_box(MeshScanPair::new(a.at(at_a), b.at(at_b)).distance(&plan, &mut scratch));
         }
     });
     Ok(())

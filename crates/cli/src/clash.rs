@@ -11,9 +11,9 @@ use clap::Args;
 use nearmiss::store::Progress;
 use nearmiss::{Budget, ClashOptions, ClashPlan, Pair, Scan, Scratch};
 
+use crate::bodies::Views;
 use crate::console::{Console, Results, now};
 use crate::contacts::{SHOWN, check_outputs};
-use crate::distance::beside;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
@@ -133,7 +133,7 @@ fn tell(list: &List<'_>, json: bool, micros: f64) -> Result<(), CliError> {
         results.line(line)?;
     }
     let distance = if list.found.clashes.is_empty() {
-        beside(list.views, list.plan.options().semantics, &Budget::UNLIMITED)
+        Views::Scans(list.views.map(|view| *view)).beside(list.plan.options().semantics, &Budget::UNLIMITED)
     } else {
         None
     };

@@ -1,4 +1,4 @@
-//! `collide`: tests whether two scans touch, and where.
+//! `collide`: tests whether two scans, or a mesh and a scan, touch, and where.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -6,14 +6,15 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, Contacts, Deadline, Detail, Distance, DistanceOptions,
-    DistancePlan, Evidence, ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch, Verdict,
+    Answer, Budget, CollideOptions, Contacts, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
+    Evidence, Metric, Pose, Proof, Scan, Scratch, Verdict,
 };
 
-use crate::as_mesh::{AsMeshName, OF_COLLIDE};
+use crate::answer_report::AnswerReport;
+use crate::as_mesh::AsMeshName;
+use crate::bodies::{Bodies, Plan, Wanted};
 use crate::console::{self, Console, Results, now};
 use crate::contacts::ContactArgs;
-use crate::distance::beside;
 use crate::distance_picture::paint_apart;
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -25,9 +26,7 @@ use crate::path_entry::{PathEntry, PathVerdict};
 use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
-use crate::report::AnswerReport;
 use crate::search::SearchArgs;
-use crate::sentence::{hint, sentence, unit};
 use crate::units::SizeCheck;
 use crate::viewpoint::ViewArgs;
 use crate::{mesh, output, picture, proof};
@@ -53,8 +52,10 @@ pub struct CollideArgs {
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Compare the triangles of meshes instead of points; `both` does what `mesh-collide` does
-    #[arg(long, value_enum, value_name = "WHICH", conflicts_with_all = OF_COLLIDE)]
+    /// Compare the triangles of these inputs instead of points
+    ///
+    /// `both` does what `mesh-collide` does. With `a` or `b`, the other input is a scan.
+    #[arg(long, value_enum, value_name = "WHICH")]
     pub as_mesh: Option<AsMeshName>,
     /// Report scans that come nearer than this as touching, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
@@ -135,11 +136,10 @@ pub enum EvidenceName {
     Estimated,
 }
 
-/// The scans and settings that all queries share.
+/// The bodies and settings that all queries share.
 struct Question {
-    a: Scan,
-    b: Scan,
-    plan: CollidePlan,
+    bodies: Bodies,
+    plan: Plan,
     budget: Option<Duration>,
     work: Option<u64>,
     resolution: Option<f64>,
@@ -156,28 +156,18 @@ impl Question {
     fn ask(&self, line: Option<u64>, posed: Posed, scratch: &mut Scratch) -> Asked {
         let Posed { poses, time } = posed;
         let start = now();
-        let [a, b] = self.views(&poses);
-        let budget = self.budget_from(start);
-        let mut proof = self.prove.then(Proof::default);
-        let mut contacts = self.all.then(Contacts::default);
-        let mut manifold = self.manifold.then(Vec::new);
-        let pair = Pair::new(a, b).within(&budget);
-        let mut question = pair.question();
-        if let Some(proof) = &mut proof {
-            question = question.proof(proof);
-        }
-        if let Some(contacts) = &mut contacts {
-            question = question.contacts(contacts);
-        }
-        if let Some(manifold) = &mut manifold {
-            question = question.manifold(manifold);
-        }
-        let answer = question.collide(&self.plan, scratch);
+        let views = self.bodies.at(&poses);
+        let mut wanted = Wanted {
+            proof: self.prove.then(Proof::default),
+            contacts: self.all.then(Contacts::default),
+            manifold: self.manifold.then(Vec::new),
+        };
+        let answer = views.collide(&self.plan, &self.budget_from(start), &mut wanted, scratch);
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
         let clearance = self.clearance.as_ref().filter(|_| needs_clearance(&answer, self.plan.options()));
-        let clearance = clearance.map(|plan| pair.within(&self.budget_from(now())).distance(plan, scratch));
-        Asked { line, time, poses, answer, clearance, proof, contacts, manifold, micros }
+        let clearance = clearance.map(|plan| views.distance(plan, &self.budget_from(now()), scratch));
+        Asked { line, time, poses, answer, clearance, wanted, micros }
     }
 
     /// Returns the budget of a query that starts at `start`.
@@ -195,26 +185,23 @@ impl Question {
         budget
     }
 
-    fn views(&self, poses: &[Pose; 2]) -> [Placed<'_>; 2] {
-        [self.a.at(&poses[0]), self.b.at(&poses[1])]
-    }
-
     fn tell(&self, out: &mut Outputs<'_, '_, '_>, asked: &Asked, args: &CollideArgs) -> Result<(), CliError> {
-        let [a, b] = self.views(&asked.poses);
-        self.sizes.compare([&a, &b]);
-        if let (Some((path, file)), Some(proof)) = (&mut out.proof, &asked.proof) {
+        let views = self.bodies.at(&asked.poses);
+        let Wanted { proof, contacts, manifold } = &asked.wanted;
+        views.compare_sizes(&self.sizes);
+        if let (Some((path, file)), Some(proof), Some(scans)) = (&mut out.proof, proof, views.scans()) {
             let line = asked.line.unwrap_or(0);
-            proof::write(file, line, [&a, &b], self.plan.options(), &asked.answer, proof)
+            proof::write(file, line, scans, self.plan.options(), &asked.answer, proof)
                 .map_err(CliError::writing(path))?;
         }
         if let (Some(log), Some(line)) = (&mut out.log, asked.line) {
             log.add(asked.entry(line))?;
         }
         let results = &mut *out.results;
-        let report = AnswerReport::new(&asked.answer, asked.contacts.as_ref(), asked.micros);
-        let report = report.with_manifold(asked.manifold.as_deref());
-        let all = asked.contacts.as_ref().map(|all| all.contacts.as_slice());
-        let grouped = all.map(|all| (all, args.contacts.group(all, [&a, &b])));
+        let report = AnswerReport::new(&asked.answer, contacts.as_ref(), asked.micros).of(views.items());
+        let report = report.with_manifold(manifold.as_deref());
+        let all = contacts.as_ref().map(|all| all.contacts.as_slice());
+        let grouped = all.map(|all| (all, views.group(all, &args.contacts)));
         if let Some((all, grouped)) = &grouped {
             let csv = args.path.csv.as_deref().filter(|_| asked.line.is_none());
             args.contacts.write(csv, all, grouped)?;
@@ -225,22 +212,21 @@ impl Question {
         }
         let options = self.plan.options();
         let is_apart = asked.line.is_none() && asked.answer.verdict.is_separated();
-        let distance =
-            is_apart.then(|| beside([&a, &b], options.semantics, &self.budget_from(now()))).flatten();
+        let distance = is_apart.then(|| views.beside(options.semantics, &self.budget_from(now()))).flatten();
         let distance = distance.as_ref().or(asked.clearance.as_ref());
-        let sentence = sentence(&asked.answer, [&a, &b], options, distance);
+        let sentence = views.sentence(&asked.answer, options, distance);
         if let Some(line) = asked.line {
             return results.line(format_args!("line {line}: {sentence}"));
         }
         results.line(sentence)?;
-        if let Some(hint) = hint(&asked.answer, [&a, &b]) {
+        if let Some(hint) = views.hint(&asked.answer) {
             results.line(hint)?;
         }
         results.line(report.details())?;
+        let unit = views.unit();
         if let Some((all, grouped)) = &grouped {
-            grouped.lines(all, unit([&a, &b])).iter().try_for_each(|line| results.line(line))?;
+            grouped.lines(all, unit).iter().try_for_each(|line| results.line(line))?;
         }
-        let unit = unit([&a, &b]);
         report.contacts(unit).chain(report.manifold(unit)).try_for_each(|contact| results.line(contact))
     }
 }
@@ -260,12 +246,7 @@ struct Asked {
     answer: Answer,
     /// The distance, if it was computed.
     clearance: Option<Distance>,
-    /// The proof, if it is to be written.
-    proof: Option<Proof>,
-    /// All contacts, with `--all`.
-    contacts: Option<Contacts>,
-    /// The manifold, with `--detail manifold`.
-    manifold: Option<Vec<ManifoldPoint>>,
+    wanted: Wanted,
     micros: f64,
 }
 
@@ -303,8 +284,10 @@ struct Outputs<'a, 'p, 'c> {
 
 pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     if let Some(which) = args.as_mesh {
-        which.check()?;
-        return mesh::collide::run(&mesh_args(args));
+        which.check_collide(args)?;
+        if which == AsMeshName::Both {
+            return mesh::collide::run(&mesh_args(args));
+        }
     }
     let console = Console::new(args.quiet);
     if let Some(path) = &args.image {
@@ -320,21 +303,17 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
 
     let threads = args.threads.unwrap_or(0);
-    let [a, b] = open(args, threads, console)?;
-    args.search.check([&a, &b], args.pair.inputs())?;
-    if args.search.wants_graphs() {
-        a.make_ready();
-    }
-    let plan = CollidePlan::new(&options(args, &a)?, &a, &b)?;
+    let bodies = open(args, threads, console)?;
+    let plan = bodies.plan(&options(args, bodies.scan())?)?;
     let prove = args.prove.is_some();
     let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);
     let sizes = args.pair.size_check(console);
     let manifold = args.detail == DetailName::Manifold;
     let wants_clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
     let distance = DistanceOptions::default().with_semantics(plan.options().semantics);
-    let clearance = wants_clearance.then(|| DistancePlan::new(&distance, &a, &b)).transpose()?;
+    let clearance = wants_clearance.then(|| bodies.distance_plan(&distance)).transpose()?;
     let question =
-        Question { a, b, plan, budget, work, resolution, prove, all: args.all, manifold, clearance, sizes };
+        Question { bodies, plan, budget, work, resolution, prove, all: args.all, manifold, clearance, sizes };
 
     let mut results = Results::new();
     output::replace_if_any(args.prove.as_deref(), |proof| {
@@ -399,34 +378,44 @@ fn conclude(question: &Question, args: &CollideArgs, out: &mut Outputs<'_, '_, '
     if args.json {
         return Ok(());
     }
-    let unit = question.a.sampling_radius().min(question.b.sampling_radius()) / 100.0;
-    out.results.line(log.summary(unit, args.margin))
+    out.results.line(log.summary(question.bodies.unit(), args.margin))
 }
 
-/// Opens both scans. Scans with different kernels may be mixed for `--thickened`, which uses no
+/// Opens both inputs. Scans with different kernels may be mixed for `--thickened`, which uses no
 /// kernel.
-fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2], CliError> {
+fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<Bodies, CliError> {
     let opening = args.pair.opening(Some(threads), console);
-    if args.meaning.thickened.is_some() {
-        return opening.open_points(args.pair.inputs());
-    }
+    let inputs = args.pair.inputs();
     let kernel = args.kernel.map(KernelName::metric);
-    let scans = if args.search.wants_graphs() && kernel.is_none() {
-        opening.open_both_with_graphs(args.pair.inputs(), &args.search.graph_options())?
+    let bodies = if let Some(which) = args.as_mesh {
+        opening.open_mesh_and_scan(which, kernel, inputs)?
+    } else if args.meaning.thickened.is_some() {
+        Bodies::Scans(opening.open_points(inputs)?)
+    } else if args.search.wants_graphs() && kernel.is_none() {
+        Bodies::Scans(opening.open_both_with_graphs(inputs, &args.search.graph_options())?)
     } else {
-        opening.open_both(kernel, args.pair.inputs())?
+        Bodies::Scans(opening.open_both(kernel, inputs)?)
     };
-    if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
+    if let Bodies::Scans([a, b]) = &bodies {
+        args.search.check([a, b], inputs)?;
+        if args.search.wants_graphs() {
+            a.make_ready();
+        }
+    }
+    if args.meaning.thickened.is_some() || bodies.scan().metric() != Metric::Geodesic {
+        return Ok(bodies);
+    }
+    if args.prove.is_some() {
         let what = "--prove: expected scans prepared for the euclidean kernel, got the geodesic kernel, which proves \
                     no separation; prepare the scans again with `--kernel euclidean`";
         return Err(CliError::Usage(what.into()));
     }
-    if args.evidence == Some(EvidenceName::Certified) && scans[0].metric() == Metric::Geodesic {
+    if args.evidence == Some(EvidenceName::Certified) {
         console::warn(
             "--evidence certified: the geodesic kernel proves no separation, so separations are estimated",
         );
     }
-    Ok(scans)
+    Ok(bodies)
 }
 
 /// Answers the query with the poses of the command line.
@@ -437,11 +426,11 @@ fn answer_one(
     console: Console,
     out: &mut Outputs<'_, '_, '_>,
 ) -> Result<(), CliError> {
-    let poses = posing::of_options(matrices, [&question.a, &question.b])?;
+    let poses = posing::of_options(matrices, question.bodies.posable())?;
     let asked = question.ask(None, Posed { poses, time: None }, &mut Scratch::default());
-    if let Some(path) = &args.image {
+    let views = question.bodies.at(&asked.poses);
+    if let Some((path, scans)) = args.image.as_ref().zip(views.scans()) {
         let bar = console.spinner(format_args!("painting {}", path.display()));
-        let [a, b] = question.views(&asked.poses);
         let style = picture::Style {
             names: picture::names(args.pair.inputs()),
             points: args.meaning.thickened.is_some(),
@@ -451,13 +440,13 @@ fn answer_one(
         let apart = match asked.answer.verdict {
             Verdict::Separated { evidence, .. } => {
                 let semantics = question.plan.options().semantics;
-                beside([&a, &b], semantics, &question.budget_from(now())).map(|found| (found, evidence))
+                views.beside(semantics, &question.budget_from(now())).map(|found| (found, evidence))
             }
             _ => None,
         };
         let picture = match apart.filter(|(found, _)| found.upper > 0.0 && found.upper.is_finite()) {
-            Some((found, evidence)) => paint_apart([&a, &b], &found, evidence, &style),
-            None => picture::paint([&a, &b], &asked.answer, &style),
+            Some((found, evidence)) => paint_apart(scans, &found, evidence, &style),
+            None => picture::paint(scans, &asked.answer, &style),
         };
         picture.save(path)?;
         drop(bar);
@@ -475,7 +464,7 @@ fn answer_all(
 ) -> Result<(), CliError> {
     let _watch = poses.watch(console, out.results);
     let ask = |poses: &PoseFile, (line, text): &PoseLine, scratch: &mut Scratch| {
-        let posed = poses.poses(*line, text, [&question.a, &question.b])?;
+        let posed = poses.poses(*line, text, question.bodies.posable())?;
         let asked = question.ask(Some(*line), posed, scratch);
         poses.answered();
         Ok(asked)

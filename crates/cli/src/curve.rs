@@ -8,6 +8,7 @@ use nearmiss::io::{Column, PlyPoints};
 use nearmiss::{Budget, Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Pair, Placed, Scratch};
 use serde::Serialize;
 
+use crate::answer_report::AnswerReport;
 use crate::console::{Console, Results, now};
 use crate::curve_picture;
 use crate::digits::{count, rough, short, work};
@@ -18,7 +19,6 @@ use crate::parse::parse_duration;
 use crate::picture::names;
 use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
-use crate::report::AnswerReport;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture, posing};
 

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use nearmiss::{
-    Budget, Deadline, Distance, DistanceOptions, DistancePlan, Pair, Placed, Pose, Scan, Scratch, Semantics,
-};
+use nearmiss::{Budget, Deadline, Distance, DistanceOptions, DistancePlan, Pose, Scan, Scratch, Semantics};
 use serde::Serialize;
 
-use crate::as_mesh::{AsMeshName, OF_DISTANCE};
+use crate::answer_report::word;
+use crate::as_mesh::AsMeshName;
+use crate::bodies::Bodies;
 use crate::console::{Console, Results, now};
 use crate::digits::{rough, short, work};
 use crate::distance_picture::paint_distance;
@@ -23,8 +23,7 @@ use crate::path_entry::{PathEntry, PathVerdict};
 use crate::picture::names;
 use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
-use crate::report::word;
-use crate::sentence::{bracket, unit, untold};
+use crate::sentence::{bracket, untold};
 use crate::units::SizeCheck;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
@@ -46,8 +45,10 @@ pub struct DistanceArgs {
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Compare the triangles of meshes instead of points; the distance is then exact
-    #[arg(long, value_enum, value_name = "WHICH", conflicts_with_all = OF_DISTANCE)]
+    /// Compare the triangles of these inputs instead of points
+    ///
+    /// With `both`, the distance is exact. With `a` or `b`, the other input is a scan.
+    #[arg(long, value_enum, value_name = "WHICH")]
     pub as_mesh: Option<AsMeshName>,
     /// Stop when the bounds differ by at most this share of the upper one: from 0 to less than
     /// 1
@@ -105,9 +106,9 @@ struct DistanceReport {
     micros: f64,
 }
 
-/// The scans and settings that all queries share.
+/// The bodies and settings that all queries share.
 struct Question<'a> {
-    scans: [&'a Scan; 2],
+    bodies: Bodies,
     plan: DistancePlan,
     args: &'a DistanceArgs,
     sizes: SizeCheck,
@@ -115,8 +116,10 @@ struct Question<'a> {
 
 pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     if let Some(which) = args.as_mesh {
-        which.check()?;
-        return of_meshes(args).run();
+        which.check_distance(args)?;
+        if which == AsMeshName::Both {
+            return of_meshes(args).run();
+        }
     }
     let console = Console::new(args.quiet);
     if let Some(path) = &args.image {
@@ -128,13 +131,14 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
     let inputs = args.pair.inputs();
     let opening = args.pair.opening(args.threads, console);
-    let [a, b] = if args.meaning.thickened.is_some() {
-        opening.open_points(inputs)?
-    } else {
-        opening.open_both(args.kernel.map(KernelName::metric), inputs)?
+    let kernel = args.kernel.map(KernelName::metric);
+    let bodies = match args.as_mesh {
+        Some(which) => opening.open_mesh_and_scan(which, kernel, inputs)?,
+        None if args.meaning.thickened.is_some() => Bodies::Scans(opening.open_points(inputs)?),
+        None => Bodies::Scans(opening.open_both(kernel, inputs)?),
     };
-    let plan = DistancePlan::new(&options(args, &a), &a, &b)?;
-    let question = Question { scans: [&a, &b], plan, args, sizes: args.pair.size_check(console) };
+    let plan = bodies.distance_plan(&options(args, bodies.scan()))?;
+    let question = Question { bodies, plan, args, sizes: args.pair.size_check(console) };
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
@@ -143,11 +147,11 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
             question.answer_all(poses, &mut log, &mut results)?;
             drop(watch);
             log.draw(&args.path, &names(inputs), 0.0)?;
-            let unit = a.sampling_radius().min(b.sampling_radius()) / 100.0;
+            let unit = question.bodies.unit();
             if args.json { Ok(()) } else { results.line(log.summary(unit, 0.0)) }
         })?,
         None => {
-            let poses = posing::of_options(&matrices, question.scans)?;
+            let poses = posing::of_options(&matrices, question.bodies.posable())?;
             question.answer(None, &poses, &mut Scratch::default(), &mut results)?;
         }
     }
@@ -176,7 +180,7 @@ impl Question<'_> {
         let mut scratch = Scratch::default();
         while let Some((line, text)) = poses.next_line()? {
             // Answers to the lines before a faulty one are written before the error.
-            let read = poses.poses(line, &text, self.scans);
+            let read = poses.poses(line, &text, self.bodies.posable());
             let Posed { poses: poses_of_line, time } =
                 read.or_else(|fault| results.flush().and(Err(fault)))?;
             let (found, micros) = self.answer(Some(line), &poses_of_line, &mut scratch, results)?;
@@ -198,35 +202,36 @@ impl Question<'_> {
         results: &mut Results,
     ) -> Result<(Distance, f64), CliError> {
         let start = now();
-        let [a, b] = [self.scans[0].at(&poses[0]), self.scans[1].at(&poses[1])];
+        let views = self.bodies.at(poses);
         let mut budget = Budget::UNLIMITED;
         (budget.work, budget.deadline) =
             (self.args.work, self.args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
-        let found = Pair::new(a, b).within(&budget).distance(&self.plan, scratch);
+        let found = views.distance(&self.plan, &budget, scratch);
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
-        self.sizes.compare([&a, &b]);
-        if let Some(path) = &self.args.image {
+        views.compare_sizes(&self.sizes);
+        if let Some((path, scans)) = self.args.image.as_ref().zip(views.scans()) {
             let style = picture::Style {
                 names: names(self.args.pair.inputs()),
                 points: self.args.meaning.thickened.is_some(),
                 view: self.args.view,
                 unit: self.args.pair.world_unit(),
             };
-            paint_distance([&a, &b], &found, &style).save(path)?;
+            paint_distance(scans, &found, &style).save(path)?;
         }
         if self.args.json {
             results.json(&report(&found, micros))?;
             return Ok((found, micros));
         }
-        let sentence = sentence(&found, [&a, &b], self.plan.options());
+        let sentence = sentence(&found, views.unit(), self.plan.options());
         if let Some(line) = line {
             results.line(format_args!("line {line}: {sentence}"))?;
             return Ok((found, micros));
         }
         results.line(sentence)?;
+        let [of_a, of_b] = views.items();
         results.line(format_args!(
-            "between point {} of a and point {} of b (counted from 0); {}",
+            "between {of_a} {} of a and {of_b} {} of b (counted from 0); {}",
             found.sources[0].0,
             found.sources[1].0,
             work(
@@ -260,7 +265,7 @@ fn report(found: &Distance, micros: f64) -> DistanceReport {
 }
 
 /// Returns the distance as a sentence.
-fn sentence(found: &Distance, views: [&Placed<'_>; 2], options: &DistanceOptions) -> String {
+fn sentence(found: &Distance, unit: f64, options: &DistanceOptions) -> String {
     let semantics = options.semantics;
     let unfinished =
         if found.complete { "" } else { " The budget ran out; raise --budget or --work for tighter bounds." };
@@ -271,7 +276,7 @@ fn sentence(found: &Distance, views: [&Placed<'_>; 2], options: &DistanceOptions
         };
         return format!("They touch ({}){untold}.{unfinished}", word(found.evidence));
     }
-    let bracket = bracket(found, unit(views));
+    let bracket = bracket(found, unit);
     match semantics {
         Semantics::Thickened(_) => format!("They are {bracket}.{unfinished}"),
         _ => format!(
@@ -297,13 +302,6 @@ fn limited(found: &Distance, options: &DistanceOptions) -> Option<String> {
             short(100.0 * options.relative)
         )
     })
-}
-
-/// Returns the distance of two scans, found within a budget, to state it with a separation.
-pub(crate) fn beside(views: [&Placed<'_>; 2], semantics: Semantics, budget: &Budget) -> Option<Distance> {
-    let options = DistanceOptions::default().with_semantics(semantics);
-    let plan = DistancePlan::new(&options, views[0].scan(), views[1].scan()).ok()?;
-    Some(Pair::new(*views[0], *views[1]).within(budget).distance(&plan, &mut Scratch::default()))
 }
 
 /// Parses a relative precision.

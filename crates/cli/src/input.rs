@@ -74,7 +74,7 @@ impl Opening {
 
     /// As [`Self::open`], for this kernel if one is given. Raw inputs are prepared for it, by
     /// default for the euclidean kernel. Fails for a scan prepared for another kernel.
-    fn open_for(self, kernel: Option<Metric>, path: &Path) -> Result<Scan, CliError> {
+    pub(crate) fn open_for(self, kernel: Option<Metric>, path: &Path) -> Result<Scan, CliError> {
         check_there(path)?;
         if is_prepared(path) {
             let check = if self.verify { Check::Full } else { Check::Structure };

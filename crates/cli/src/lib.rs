@@ -21,6 +21,7 @@ mod slices;
 mod touch;
 
 mod as_mesh;
+mod bodies;
 mod estimate;
 mod filters;
 mod guarded;
@@ -40,6 +41,7 @@ mod threads;
 mod units;
 
 mod advice;
+mod answer_report;
 mod contacts;
 mod digits;
 mod health;

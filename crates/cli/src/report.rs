@@ -1,15 +1,11 @@
-//! Results, as JSON and as text.
+//! Prepared scans, as JSON and as text.
 
 use nearmiss::graph::ClosePairs;
 use nearmiss::hierarchy::Topology;
-use nearmiss::{
-    Answer, Contact, Contacts, Evidence, ManifoldPoint, Metric, PointKind, Reason, Scan, SurfaceGraph,
-    Verdict,
-};
+use nearmiss::{Metric, PointKind, Scan, SurfaceGraph};
 use serde::Serialize;
 
-use crate::contacts::{GroupReport, Grouped, SHOWN};
-use crate::digits::{bytes, count, counts, percent, place, rough, short, work};
+use crate::digits::{bytes, count, counts, percent, place, short};
 use crate::filters::Filtered;
 use crate::health::Health;
 
@@ -146,7 +142,6 @@ impl ScanReport {
     }
 
     /// Returns the description as lines of text.
-    #[expect(clippy::cast_precision_loss, reason = "statistics")]
     pub(crate) fn lines(&self) -> Vec<String> {
         let unit = self.sampling_radius / 100.0;
         let [min, max] = self.bounds.map(|p| place(p, unit));
@@ -168,12 +163,7 @@ impl ScanReport {
                 short(self.horizon),
                 self.support_min
             ),
-            format!(
-                "hierarchy  {}, {}, mean depth {:.1}",
-                count(self.nodes as u64, "node"),
-                count(self.leaves as u64, "leaf"),
-                self.depth_mean
-            ),
+            hierarchy_line(self.nodes, self.leaves, self.depth_mean),
             self.graph.as_ref().map_or_else(
                 || "graph      none".to_owned(),
                 |graph| {
@@ -186,13 +176,21 @@ impl ScanReport {
                     format!("graph      {parts}, {} of the normals oriented", percent(graph.oriented))
                 },
             ),
-            format!(
-                "file       {}, {:.0} bytes per point",
-                bytes(self.bytes),
-                self.bytes as f64 / self.points as f64
-            ),
+            file_line(self.bytes, self.points, "point"),
         ]
     }
+}
+
+/// Returns a line of text about a tree.
+pub(crate) fn hierarchy_line(nodes: usize, leaves: usize, depth_mean: f64) -> String {
+    let [nodes, leaves] = [count(nodes as u64, "node"), count(leaves as u64, "leaf")];
+    format!("hierarchy  {nodes}, {leaves}, mean depth {depth_mean:.1}")
+}
+
+/// Returns a line of text about a file with so many items.
+#[expect(clippy::cast_precision_loss, reason = "statistics")]
+pub(crate) fn file_line(length: u64, items: usize, item: &str) -> String {
+    format!("file       {}, {:.0} bytes per {item}", bytes(length), length as f64 / items as f64)
 }
 
 /// Returns the number of leaves and their mean depth. The root has depth 0.
@@ -251,228 +249,6 @@ fn ranked_half(halves: impl Iterator<Item = u32>, mut rank: usize) -> (u32, usiz
         rank -= count;
     }
     (0, 0)
-}
-
-/// The JSON output of `collide`.
-#[derive(Debug, Serialize)]
-pub(crate) struct AnswerReport {
-    verdict: &'static str,
-    evidence: Option<&'static str>,
-    reason: Option<&'static str>,
-    witness: Option<[f64; 3]>,
-    normal_a: Option<[f64; 3]>,
-    normal_b: Option<[f64; 3]>,
-    residual: Option<f64>,
-    source_a: Option<u32>,
-    source_b: Option<u32>,
-    gap: Option<f64>,
-    distance_estimate: Option<f64>,
-    /// The length up to which the scanned surfaces may deviate from the scans; null for invalid
-    /// poses.
-    band: f64,
-    likelihood: Option<f64>,
-    evaluations: u64,
-    node_pairs: u64,
-    leaf_pairs: u64,
-    /// Steps of searches along graphs; absent for other searches.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    neighbour_steps: Option<u64>,
-    micros: f64,
-    /// `true` if `contacts` lists all contacts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    complete: Option<bool>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    contact_count: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    contacts: Option<Vec<ContactReport>>,
-    /// Contacts up to this far apart are in one clash.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    link: Option<f64>,
-    /// The groups of contacts, the greatest first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    clashes: Option<Vec<GroupReport>>,
-    /// The manifold, the deepest point first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    manifold: Option<Vec<PlaceReport>>,
-}
-
-/// A point of a manifold.
-#[derive(Debug, Serialize)]
-struct PlaceReport {
-    point: [f64; 3],
-    normal: [f64; 3],
-    gap: f64,
-    source_a: u32,
-    source_b: u32,
-}
-
-impl PlaceReport {
-    fn new(place: &ManifoldPoint) -> Self {
-        let ManifoldPoint { point, normal, gap, sources: [a, b] } = *place;
-        Self { point, normal, gap, source_a: a.0, source_b: b.0 }
-    }
-}
-
-/// A contact in the list of all contacts.
-#[derive(Debug, Serialize)]
-struct ContactReport {
-    point: [f64; 3],
-    normal_a: Option<[f64; 3]>,
-    normal_b: Option<[f64; 3]>,
-    residual: f64,
-    source_a: u32,
-    source_b: u32,
-    /// The number of its clash, counted from 1.
-    clash: u32,
-}
-
-impl ContactReport {
-    fn new(contact: &Contact) -> Self {
-        Self {
-            point: contact.point,
-            normal_a: contact.normals.map(|n| n[0]),
-            normal_b: contact.normals.map(|n| n[1]),
-            residual: contact.residual,
-            source_a: contact.sources[0].0,
-            source_b: contact.sources[1].0,
-            clash: 0,
-        }
-    }
-}
-
-impl AnswerReport {
-    pub(crate) fn new(answer: &Answer, all: Option<&Contacts>, micros: f64) -> Self {
-        let mut report = Self {
-            verdict: "undecided",
-            evidence: None,
-            reason: None,
-            witness: None,
-            normal_a: None,
-            normal_b: None,
-            residual: None,
-            source_a: None,
-            source_b: None,
-            gap: None,
-            distance_estimate: answer.distance_estimate,
-            band: answer.band,
-            likelihood: None,
-            evaluations: answer.statistics.evaluations,
-            node_pairs: answer.statistics.node_pairs,
-            leaf_pairs: answer.statistics.leaf_pairs,
-            neighbour_steps: Some(answer.statistics.neighbour_steps).filter(|&steps| steps > 0),
-            micros,
-            complete: all.map(|all| all.complete),
-            contact_count: all.map(|all| all.contacts.len()),
-            contacts: all.map(|all| all.contacts.iter().map(ContactReport::new).collect()),
-            link: None,
-            clashes: None,
-            manifold: None,
-        };
-        match answer.verdict {
-            Verdict::Intersecting { contact, evidence } => {
-                report.verdict = "intersecting";
-                report.evidence = Some(word(evidence));
-                report.witness = Some(contact.point);
-                report.normal_a = contact.normals.map(|n| n[0]);
-                report.normal_b = contact.normals.map(|n| n[1]);
-                report.residual = Some(contact.residual);
-                report.source_a = Some(contact.sources[0].0);
-                report.source_b = Some(contact.sources[1].0);
-            }
-            Verdict::Separated { gap, evidence } => {
-                report.verdict = "separated";
-                report.evidence = Some(word(evidence));
-                report.gap = (evidence == Evidence::Certified).then_some(gap);
-            }
-            Verdict::Undecided(reason) => {
-                report.reason = match reason {
-                    Reason::Budget { likelihood } => {
-                        report.likelihood = Some(likelihood);
-                        Some("budget")
-                    }
-                    Reason::Undersampled => Some("undersampled"),
-                    Reason::Ambiguous => Some("ambiguous"),
-                    Reason::Pose => Some("pose"),
-                    Reason::NoGraph => Some("no-graph"),
-                    _ => None,
-                };
-            }
-        }
-        report
-    }
-
-    /// Returns the evidence of the verdict, and the reason for an undecided one.
-    pub(crate) fn evidence_and_reason(&self) -> (Option<&'static str>, Option<&'static str>) {
-        (self.evidence, self.reason)
-    }
-
-    /// Adds a manifold.
-    pub(crate) fn with_manifold(self, places: Option<&[ManifoldPoint]>) -> Self {
-        let manifold = places.map(|places| places.iter().map(PlaceReport::new).collect());
-        Self { manifold, ..self }
-    }
-
-    /// Returns the report with the clashes into which the contacts are grouped.
-    pub(crate) fn with_clashes(mut self, grouped: Option<&(&[Contact], Grouped)>) -> Self {
-        if let Some((contacts, grouped)) = grouped {
-            self.link = Some(grouped.link);
-            self.clashes = Some(grouped.reports(contacts));
-            for (contact, &clash) in self.contacts.iter_mut().flatten().zip(&grouped.numbers) {
-                contact.clash = clash;
-            }
-        }
-        self
-    }
-
-    /// Returns a line of text for each point of the manifold, if there is one. Places are rounded
-    /// to `unit`.
-    pub(crate) fn manifold(&self, unit: f64) -> impl Iterator<Item = String> {
-        self.manifold.iter().flatten().map(move |found| {
-            let [u, v, w] = found.normal;
-            let what = if found.gap < 0.0 { "penetration depth" } else { "gap" };
-            let (at, gap) = (place(found.point, unit), short(found.gap.abs()));
-            format!("  {at}, {what} {gap}, push a along ({u:.4}, {v:.4}, {w:.4})")
-        })
-    }
-
-    /// Returns a line of text for each of the first contacts, if all were searched for, and a line
-    /// about the others. Places are rounded to `unit`.
-    pub(crate) fn contacts(&self, unit: f64) -> impl Iterator<Item = String> {
-        let contacts = self.contacts.as_deref().unwrap_or_default();
-        let lines = contacts.iter().take(SHOWN).map(move |contact| {
-            let (a, b) = (contact.source_a, contact.source_b);
-            format!(
-                "  {}, between point {a} of a and point {b} of b, residual {}",
-                place(contact.point, unit),
-                rough(contact.residual)
-            )
-        });
-        let others = contacts.len().saturating_sub(SHOWN) as u64;
-        let rest = format!("  … and {}; --csv, --ply and --json hold all", count(others, "other contact"));
-        lines.chain((others > 0).then_some(rest))
-    }
-
-    /// Returns a line of text with the points of a contact and the work of the search.
-    pub(crate) fn details(&self) -> String {
-        let between = match (self.source_a, self.source_b) {
-            (Some(a), Some(b)) => format!("between point {a} of a and point {b} of b (counted from 0); "),
-            _ => String::new(),
-        };
-        let counts = [
-            (self.node_pairs, "node pair"),
-            (self.leaf_pairs, "leaf pair"),
-            (self.evaluations, "evaluation"),
-            (self.neighbour_steps.unwrap_or(0), "neighbour step"),
-        ];
-        format!("{between}{}", work(counts, self.micros))
-    }
-}
-
-pub(crate) fn word(evidence: Evidence) -> &'static str {
-    match evidence {
-        Evidence::Certified => "certified",
-        Evidence::Estimated => "estimated",
-    }
 }
 
 #[cfg(test)]

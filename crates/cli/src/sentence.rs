@@ -2,14 +2,14 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
-    Aabb, Answer, CollideOptions, Contact, Distance, Method, Metric, Placed, PointKind, Reason, Semantics,
-    Verdict,
+    Aabb, Answer, CollideOptions, Contact, Distance, Evidence, Method, Metric, Placed, PointKind, Reason,
+    Semantics, Verdict,
 };
 
 use crate::advice;
+use crate::answer_report::word;
 use crate::digits::{percent, place, rough, rounded, rounded_down, short};
 use crate::picture::stored_index;
-use crate::report::word;
 
 /// Returns the answer to a question with these `options`, as a sentence. It states a clearance only if
 /// `distance` is given: the proven gap of a verdict may be much smaller than the distance.
@@ -51,25 +51,66 @@ pub(crate) fn sentence(
                 ),
             }
         }
-        Verdict::Separated { gap, evidence } => {
-            let found = if gap > 0.0 { "" } else { " found" };
-            let within = margin.map_or(String::new(), |margin| format!(" within {margin}"));
-            let apart = distance.map(|distance| {
-                if distance.upper <= 0.0 {
-                    return "; no clearance is known".to_owned();
-                }
-                let distance = Distance { lower: distance.lower.max(gap).min(distance.upper), ..*distance };
-                let is_near = thickened.is_none() && distance.upper < distance.band;
-                let near = if is_near {
-                    format!(", less than the local spacing of {}", rough(distance.band))
-                } else {
-                    String::new()
-                };
-                format!("; {}{near}", bracket(&distance, unit))
-            });
-            format!("No contact{found}{within}{} ({}).", apart.unwrap_or_default(), word(evidence))
+        Verdict::Separated { gap, evidence } => no_contact((gap, evidence), options, distance, unit),
+        Verdict::Undecided(reason) => format!("Cannot tell: {}.", why(reason, views, ["a", "b"], options)),
+    }
+}
+
+/// Returns a separation as a sentence.
+fn no_contact(
+    (gap, evidence): (f64, Evidence),
+    options: &CollideOptions,
+    distance: Option<&Distance>,
+    unit: f64,
+) -> String {
+    let of_points = matches!(options.semantics, Semantics::Thickened(_));
+    let found = if gap > 0.0 { "" } else { " found" };
+    let within =
+        if options.margin > 0.0 { format!(" within {}", short(options.margin)) } else { String::new() };
+    let apart = distance.map(|distance| {
+        if distance.upper <= 0.0 {
+            return "; no clearance is known".to_owned();
         }
-        Verdict::Undecided(reason) => format!("Cannot tell: {}.", why(reason, views, options)),
+        let distance = Distance { lower: distance.lower.max(gap).min(distance.upper), ..*distance };
+        let near = if !of_points && distance.upper < distance.band {
+            format!(", less than the local spacing of {}", rough(distance.band))
+        } else {
+            String::new()
+        };
+        format!("; {}{near}", bracket(&distance, unit))
+    });
+    format!("No contact{found}{within}{} ({}).", apart.unwrap_or_default(), word(evidence))
+}
+
+/// Returns the answer about a mesh and a scan as a sentence, as [`sentence`] does for two scans.
+pub(crate) fn against_mesh(
+    answer: &Answer,
+    (letter, scan): (&str, &Placed<'_>),
+    options: &CollideOptions,
+    distance: Option<&Distance>,
+) -> String {
+    let unit = unit([scan; 2]);
+    match answer.verdict {
+        Verdict::Intersecting { contact, evidence } => {
+            let at = place(contact.point, unit);
+            let margin = (options.margin > 0.0).then(|| short(options.margin));
+            match (options.semantics, margin) {
+                (Semantics::Thickened(radius), Some(margin)) => {
+                    format!("A ball of radius {} comes within {margin} of the mesh at {at}.", short(radius))
+                }
+                (Semantics::Thickened(radius), None) => {
+                    format!("A ball of radius {} meets the mesh at {at}.", short(radius))
+                }
+                (_, Some(margin)) => {
+                    format!("They come within {margin} of each other at {at} ({}).", word(evidence))
+                }
+                (_, None) => format!("They touch at {at} ({}); {}.", word(evidence), untold(answer.band)),
+            }
+        }
+        Verdict::Separated { gap, evidence } => no_contact((gap, evidence), options, distance, unit),
+        Verdict::Undecided(reason) => {
+            format!("Cannot tell: {}.", why(reason, [scan; 2], [letter; 2], options))
+        }
     }
 }
 
@@ -104,16 +145,8 @@ fn points_apart(contact: &Contact, views: [&Placed<'_>; 2]) -> f64 {
     (at(1) - at(0)).norm()
 }
 
-/// Returns a hint if the gap between the bounding boxes exceeds the size of both scans, which is
-/// rarely intended.
-pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
-    if !answer.verdict.is_separated() {
-        return None;
-    }
-    far_apart(views.map(world_bounds))
-}
-
-/// Returns a hint if the gap between two bounding boxes exceeds the size of both.
+/// Returns a hint if the gap between two bounding boxes exceeds the size of both, which is rarely
+/// intended.
 pub(crate) fn far_apart([a, b]: [Aabb; 2]) -> Option<String> {
     let apart = (0..3).map(|k| (a.min[k] - b.max[k]).max(b.min[k] - a.max[k]).max(0.0).powi(2)).sum::<f64>();
     let apart = apart.sqrt();
@@ -124,14 +157,19 @@ pub(crate) fn far_apart([a, b]: [Aabb; 2]) -> Option<String> {
 }
 
 /// Returns the bounds of a posed scan, in world units.
-fn world_bounds(view: &Placed<'_>) -> Aabb {
+pub(crate) fn world_bounds(view: &Placed<'_>) -> Aabb {
     let frame = view.scan().frame();
     let to_stored = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - frame.origin[k]) / frame.scale);
     Aabb::of(view.scan().bounds().corners().map(|p| view.stored_to_world().apply(to_stored(p))))
 }
 
-/// Returns the reason for an undecided answer, with remedies.
-pub(crate) fn why(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> String {
+/// Returns the reason for an undecided answer, with remedies. `letters` name the scans.
+pub(crate) fn why(
+    reason: Reason,
+    views: [&Placed<'_>; 2],
+    letters: [&str; 2],
+    options: &CollideOptions,
+) -> String {
     // Obstacles are never undecided for lack of samples, because points that sample no surface are
     // balls.
     let first = match (options.method, options.metric) {
@@ -141,7 +179,7 @@ pub(crate) fn why(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOpti
     };
     let worse = |share: fn(&Placed<'_>) -> f64| {
         let [of_a, of_b] = views.map(share);
-        if of_b > of_a { ("b", views[1], of_b) } else { ("a", views[0], of_a) }
+        if of_b > of_a { (letters[1], views[1], of_b) } else { (letters[0], views[0], of_a) }
     };
     let radius = views.map(world_radius).into_iter().fold(0.0, f64::max);
     match reason {

@@ -39,13 +39,14 @@ pub use nearmiss_hierarchy::{
     PointGatherer, PointHierarchy, PointKind, ScanPoints,
 };
 pub use nearmiss_query::{
-    Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan,
-    Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve, CurveEnd,
-    CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence,
-    Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair, MeshQuality,
-    MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method, NearestPoint, Order, Pacer, Pair, PairHint,
-    Placed, PlacedMesh, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch,
-    Semantics, Shape, ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
+    Answer, BatchScratch, Bodies, Body, BodyId, BodyPair, Brackets, Budget, Clash, ClashKind, ClashOptions,
+    ClashPlan, Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve,
+    CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
+    Evidence, Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair,
+    MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method, NearestPoint,
+    Order, Pacer, Pair, PairHint, Placed, PlacedBody, PlacedMesh, PlanError, Prepared, PreparedMesh, Proof,
+    Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize,
+    Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

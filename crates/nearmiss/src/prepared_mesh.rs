@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nearmiss_geometry::{Pose, TriangleMesh};
 use nearmiss_hierarchy::{MeshBuildError, MeshBuildOptions, MeshHierarchy, MeshMeta};
-use nearmiss_query::PlacedMesh;
+use nearmiss_query::{PlacedMesh, PreparedMesh};
 use nearmiss_store::{Bytes, Check, File, LoadError, WriteError, Writer};
 
 /// Version of the layout of a mesh's sections and metadata. Raise it whenever one of them is added
@@ -44,6 +44,13 @@ impl Deref for Mesh {
 
     fn deref(&self) -> &MeshHierarchy {
         &self.hierarchy
+    }
+}
+
+impl PreparedMesh for Mesh {
+    #[inline]
+    fn at(&self, pose: &Pose) -> PlacedMesh<'_> {
+        Mesh::at(self, pose)
     }
 }
 

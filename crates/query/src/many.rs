@@ -1,4 +1,5 @@
-//! Batches of questions and worlds of many scans.
+//! Batches of questions and worlds of many scans and meshes.
 
 pub(crate) mod batch;
+pub(crate) mod body;
 pub(crate) mod world;

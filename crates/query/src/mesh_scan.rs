@@ -3,6 +3,7 @@
 pub(crate) mod collide;
 pub(crate) mod disc_triangle;
 pub(crate) mod distance;
+pub(crate) mod hint;
 pub(crate) mod leaves;
 pub(crate) mod mesh_scan_pair;
 pub(crate) mod pair;

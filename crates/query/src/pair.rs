@@ -1,6 +1,7 @@
 //! Placed scans, pairs of them under a relative pose, and the cost of a search.
 
 pub(crate) mod bounds;
+pub(crate) mod clearance;
 pub(crate) mod likelihood;
 pub(crate) mod meter;
 pub(crate) mod pairing;

@@ -13,6 +13,7 @@ use crate::contact::collide::{Asked, ContactScratch, Outputs};
 use crate::contact::hint::PairHint;
 use crate::curve::{CurvePlan, CurveScratch, Curves};
 use crate::distance::{Distance, DistancePlan};
+use crate::mesh::pair::MeshScratch;
 use crate::pair::placed::Placed;
 use crate::papers::PapersScratch;
 
@@ -27,6 +28,7 @@ pub struct Scratch {
     papers: PapersScratch,
     pub(crate) distance: crate::distance::Frontier,
     curve: CurveScratch,
+    meshes: MeshScratch,
 }
 
 impl Default for Scratch {
@@ -45,7 +47,14 @@ impl Scratch {
             papers: PapersScratch::default(),
             distance: crate::distance::Frontier::default(),
             curve: CurveScratch::default(),
+            meshes: MeshScratch::by_level(level),
         }
+    }
+
+    /// Returns the working memory of queries about two meshes, for example in a batch
+    /// ([`each`](crate::each)).
+    pub fn meshes(&mut self) -> &mut MeshScratch {
+        &mut self.meshes
     }
 
     /// Returns the SIMD instruction set that queries use.

@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::path::PathBuf;
 
 use nearmiss::hierarchy::Relative;
-use nearmiss::{Budget, Mesh, MeshBuildOptions, MeshPair, MeshQuality, MeshScratch, Pose};
+use nearmiss::{Budget, Mesh, MeshBuildOptions, MeshHint, MeshPair, MeshQuality, MeshScratch, Pose};
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::plot::{self, Axis, Line, Panel};
@@ -222,5 +222,38 @@ fn measure(source: &str, options: &Options) -> Result<(String, Curves), Failure>
         engine.distances.iter().for_each(|&(_, time)| column.times.push(time));
         column.row(&format!("distance by {}", engine.name));
     }
+    coherent(&mesh, &object, &apart, &mut scratch);
     Ok((object.name, curves))
+}
+
+/// Measures steps of r/100, r/10 and r from separated poses, towards the other copy and sideways.
+fn coherent(mesh: &Mesh, object: &Object, apart: &[Pose], scratch: &mut MeshScratch) {
+    const STEPS: u32 = 50;
+    for (name, share) in [("r/100", 0.01), ("r/10", 0.1), ("r", 1.0)] {
+        let step = share * object.r;
+        let starts = apart.iter().step_by((apart.len() / 200).max(1));
+        let walks: Vec<Vec<Pose>> = starts
+            .map(|start| {
+                let [x, y, z] = start.translation();
+                let per_length = step / (x * x + y * y + z * z).sqrt();
+                let at = |i: u32| f64::from(i) * per_length;
+                (0..STEPS)
+                    .map(|i| start.with_translation([x - x * at(i), y - y * at(i) + z * at(i), z]))
+                    .collect()
+            })
+            .collect();
+        let all = walks.concat();
+        let mut ask = |hinted: bool| {
+            let mut hint = MeshHint::default();
+            let (column, _) = Column::ask(&all, None, |pose| {
+                let pair = MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(pose));
+                let answer =
+                    if hinted { pair.collide_hinted(&mut hint, scratch) } else { pair.collide(scratch) };
+                answer.verdict.is_intersecting()
+            });
+            column
+        };
+        ask(false).row(&format!("steps of {name}"));
+        ask(true).row(&format!("steps of {name}, hinted"));
+    }
 }

@@ -148,7 +148,7 @@ pub(crate) fn sentence(list: &List<'_>, distance: Option<&Distance>) -> String {
     let mut text = match (hard, near) {
         (0, 0) => match list.found.answers.0.verdict {
             Verdict::Undecided(reason) => {
-                return format!("Cannot tell: {}.", why(reason, list.views, list.plan.options()));
+                return format!("Cannot tell: {}.", why(reason, list.views, ["a", "b"], list.plan.options()));
             }
             _ => {
                 let apart = distance.map(|found| format!("; the scans are {}", bracket(found, list.unit())));

@@ -1,7 +1,5 @@
 //! `mesh-collide`: tests whether two meshes meet, and where.
 
-use std::sync::{Mutex, PoisonError};
-
 use nearmiss::{
     MeshAnswer, MeshContact, MeshDistance, MeshPair, MeshQuality, MeshScratch, MeshVerdict, Pose, Scratch,
 };
@@ -27,22 +25,6 @@ struct Question<'a> {
     args: &'a MeshCollideArgs,
     /// `true` if the clearance of separated poses is needed.
     clearance: bool,
-    scratches: Scratches,
-}
-
-/// Working memory that threads share: each takes some for a query and gives it back.
-#[derive(Default)]
-struct Scratches(Mutex<Vec<MeshScratch>>);
-
-impl Scratches {
-    fn with<R>(&self, ask: impl FnOnce(&mut MeshScratch) -> R) -> R {
-        let free = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let taken = free().pop();
-        let mut scratch = taken.unwrap_or_default();
-        let answer = ask(&mut scratch);
-        free().push(scratch);
-        answer
-    }
 }
 
 /// A query and its answer.
@@ -90,19 +72,19 @@ pub(crate) fn run(args: &MeshCollideArgs) -> Result<(), CliError> {
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
     let meshes = TwoMeshes::open(&args.pair, args.threads, (args.budget, args.work), console)?;
     let clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
-    let question = Question { meshes, args, clearance, scratches: Scratches::default() };
+    let question = Question { meshes, args, clearance };
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
             let mut log = PathLog::new(&args.path, csv)?;
-            question.answer_all(poses, &mut log, &mut results)?;
+            question.answer_all(poses, console, &mut log, &mut results)?;
             log.draw(&args.path, &names(args.pair.inputs()), 0.0)?;
             let unit = question.meshes.unit(&[Pose::IDENTITY; 2]);
             if args.json { Ok(()) } else { results.line(log.summary(unit, 0.0)) }
         })?,
         None => {
             let poses = posing::of_options(&matrices, question.meshes.both())?;
-            let asked = question.ask(None, Posed { poses, time: None });
+            let asked = question.ask(None, Posed { poses, time: None }, &mut MeshScratch::default());
             question.tell(&asked, &mut results)?;
         }
     }
@@ -114,12 +96,16 @@ impl Question<'_> {
     fn answer_all(
         &self,
         poses: &mut PoseFile,
+        console: Console,
         log: &mut PathLog<'_>,
         results: &mut Results,
     ) -> Result<(), CliError> {
-        let ask = |poses: &PoseFile, (line, text): &PoseLine, _: &mut Scratch| {
+        let _watch = poses.watch(console, results);
+        let ask = |poses: &PoseFile, (line, text): &PoseLine, scratch: &mut Scratch| {
             let posed = poses.poses(*line, text, self.meshes.both())?;
-            Ok(self.ask(Some(*line), posed))
+            let asked = self.ask(Some(*line), posed, scratch.meshes());
+            poses.answered();
+            Ok(asked)
         };
         let is_last = |asked: &Asked| self.args.first && asked.answer.verdict.is_intersecting();
         answer_lines(poses, self.args.threads.unwrap_or(1), ask, is_last, |asked| {
@@ -133,24 +119,22 @@ impl Question<'_> {
     }
 
     /// Answers one query. `line` is the number of its line in the file of poses.
-    fn ask(&self, line: Option<u64>, Posed { poses, time }: Posed) -> Asked {
-        self.scratches.with(|scratch| {
-            let start = now();
-            let pair = self.meshes.pair(&poses, start);
-            let (answer, contacts) = if self.args.all {
-                let mut contacts = Vec::new();
-                let (answer, complete) = pair.contacts(&mut contacts, scratch);
-                (answer, Some((contacts, complete)))
-            } else {
-                (self.collide(&pair, scratch), None)
-            };
-            let micros = micros_since(start);
-            let wants_clearance = self.clearance && !answer.verdict.is_intersecting();
-            let clearance = wants_clearance.then(|| self.meshes.pair(&poses, now()).distance(scratch));
-            // An infinite distance is that of an invalid pose.
-            let clearance = clearance.filter(|found| found.upper.is_finite());
-            Asked { line, time, poses, answer, contacts, clearance, micros }
-        })
+    fn ask(&self, line: Option<u64>, Posed { poses, time }: Posed, scratch: &mut MeshScratch) -> Asked {
+        let start = now();
+        let pair = self.meshes.pair(&poses, start);
+        let (answer, contacts) = if self.args.all {
+            let mut contacts = Vec::new();
+            let (answer, complete) = pair.contacts(&mut contacts, scratch);
+            (answer, Some((contacts, complete)))
+        } else {
+            (self.collide(&pair, scratch), None)
+        };
+        let micros = micros_since(start);
+        let wants_clearance = self.clearance && !answer.verdict.is_intersecting();
+        let clearance = wants_clearance.then(|| self.meshes.pair(&poses, now()).distance(scratch));
+        // An infinite distance is that of an invalid pose.
+        let clearance = clearance.filter(|found| found.upper.is_finite());
+        Asked { line, time, poses, answer, contacts, clearance, micros }
     }
 
     /// Tests the meshes as well as --p-min and --k-min ask for.
@@ -176,8 +160,8 @@ impl Question<'_> {
         }
         let unit = self.meshes.unit(&asked.poses);
         let is_apart = asked.line.is_none() && asked.answer.verdict.is_separated();
-        let beside = is_apart
-            .then(|| self.scratches.with(|scratch| self.meshes.pair(&asked.poses, now()).distance(scratch)));
+        let beside =
+            is_apart.then(|| self.meshes.pair(&asked.poses, now()).distance(&mut MeshScratch::default()));
         let distance = beside.as_ref().or(asked.clearance.as_ref());
         let sentence = sentence(&asked.answer, distance, unit);
         if let Some(line) = asked.line {

@@ -39,7 +39,9 @@ impl DistanceQuestion<'_> {
         match &mut poses {
             Some(poses) => output::replace_if_any(self.path.csv.as_deref(), |csv| {
                 let mut log = PathLog::new(self.path, csv)?;
+                let watch = poses.watch(console, &mut results);
                 self.answer_all(&meshes, poses, &mut log, &mut results)?;
+                drop(watch);
                 log.draw(self.path, &names(self.pair.inputs()), 0.0)?;
                 let unit = meshes.unit(&[Pose::IDENTITY; 2]);
                 if self.json { Ok(()) } else { results.line(log.summary(unit, 0.0)) }
@@ -63,8 +65,10 @@ impl DistanceQuestion<'_> {
         while let Some((line, text)) = poses.next_line()? {
             // Answers to the lines before a faulty one are written before the error.
             let read = poses.poses(line, &text, meshes.both());
-            let Posed { poses, time } = read.or_else(|fault| results.flush().and(Err(fault)))?;
-            let (found, micros) = self.answer(meshes, Some(line), &poses, &mut scratch, results)?;
+            let Posed { poses: poses_of_line, time } =
+                read.or_else(|fault| results.flush().and(Err(fault)))?;
+            let (found, micros) = self.answer(meshes, Some(line), &poses_of_line, &mut scratch, results)?;
+            poses.answered();
             log.add(entry(&found, line, time, micros))?;
         }
         Ok(())

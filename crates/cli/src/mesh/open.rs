@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use nearmiss::io::{Format, ReadError};
-use nearmiss::{Aabb, Check, Mesh, MeshBuildOptions, TriangleMesh};
+use nearmiss::{Aabb, Check, Mesh, MeshBuildOptions, Metric, TriangleMesh};
 
+use crate::as_mesh::AsMeshName;
+use crate::bodies::Bodies;
 use crate::error::CliError;
 use crate::input::{self, Opening};
 use crate::posing::Posable;
@@ -65,5 +67,18 @@ impl Opening {
         let first = self.open_mesh(a)?;
         let second = if a == b { first.clone() } else { self.open_mesh(b)? };
         Ok([first, second])
+    }
+
+    /// Opens a mesh and a scan, for this kernel if one is given. `which` names the mesh.
+    pub(crate) fn open_mesh_and_scan(
+        self,
+        which: AsMeshName,
+        kernel: Option<Metric>,
+        [a, b]: [&Path; 2],
+    ) -> Result<Bodies, CliError> {
+        let mesh_is_a = which == AsMeshName::A;
+        let [of_mesh, of_scan] = if mesh_is_a { [a, b] } else { [b, a] };
+        let (mesh, scan) = (self.open_mesh(of_mesh)?, self.open_for(kernel, of_scan)?);
+        Ok(Bodies::MeshAndScan { mesh, scan, mesh_is_a })
     }
 }

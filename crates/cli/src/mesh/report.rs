@@ -4,10 +4,10 @@ use nearmiss::{ContactRegion, Mesh, MeshAnswer, MeshDistance, MeshVerdict};
 use serde::Serialize;
 
 use super::contacts::{MeshClashReport, MeshContactReport, MeshContacts};
-use super::words::between;
-use crate::digits::{bytes, count, counts, place, work};
+use crate::answer_report::{AnswerReport, between};
+use crate::digits::{counts, place, work};
 use crate::path_entry::PathVerdict;
-use crate::report::leaves;
+use crate::report::{file_line, hierarchy_line, leaves};
 use crate::units::diagonal;
 
 /// The description of a prepared mesh.
@@ -50,7 +50,6 @@ impl MeshReport {
     }
 
     /// Returns the description as lines of text.
-    #[expect(clippy::cast_precision_loss, reason = "statistics")]
     pub(crate) fn lines(&self, mesh: &Mesh) -> Vec<String> {
         let unit = 1e-5 * diagonal(mesh.bounds());
         let [min, max] = self.bounds.map(|p| place(p, unit));
@@ -63,60 +62,26 @@ impl MeshReport {
             format!("triangles  {}{dropped}", self.triangles),
             format!("vertices   {}{welded}", self.vertices),
             format!("bounds     {min} to {max}"),
-            format!(
-                "hierarchy  {}, {}, mean depth {:.1}",
-                count(self.nodes as u64, "node"),
-                count(self.leaves as u64, "leaf"),
-                self.depth_mean
-            ),
-            format!(
-                "file       {}, {:.0} bytes per triangle",
-                bytes(self.bytes),
-                self.bytes as f64 / self.triangles as f64
-            ),
+            hierarchy_line(self.nodes, self.leaves, self.depth_mean),
+            file_line(self.bytes, self.triangles, "triangle"),
         ]
     }
 }
 
 /// The JSON output of `mesh-collide`: the fields of `collide`, of which meshes leave some null, and
-/// two more.
+/// some more.
 #[derive(Debug, Serialize)]
 pub(crate) struct MeshAnswerReport {
-    verdict: &'static str,
-    evidence: Option<&'static str>,
-    reason: Option<&'static str>,
-    witness: Option<[f64; 3]>,
-    normal_a: Option<[f64; 3]>,
-    normal_b: Option<[f64; 3]>,
-    residual: (),
-    source_a: (),
-    source_b: (),
-    /// A lower bound of the distance.
-    gap: Option<f64>,
-    distance_estimate: (),
-    /// The length up to which the surfaces may deviate from the inputs.
-    band: f64,
-    likelihood: Option<f64>,
+    #[serde(flatten)]
+    answer: AnswerReport,
     /// The likelihood of contact.
     probability: Option<f64>,
     /// The place where a contact is likeliest, if undecided.
     region: Option<ContactRegion>,
     /// The triangles that meet at the witness.
     triangles: Option<[u32; 2]>,
-    evaluations: u64,
-    node_pairs: u64,
-    leaf_pairs: u64,
-    micros: f64,
-    /// `true` if `contacts` lists all contacts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    complete: Option<bool>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    contact_count: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     contacts: Option<Vec<MeshContactReport>>,
-    /// Contacts up to this far apart are in one clash.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    link: Option<f64>,
     /// The groups of contacts, the greatest first.
     #[serde(skip_serializing_if = "Option::is_none")]
     clashes: Option<Vec<MeshClashReport>>,
@@ -130,45 +95,34 @@ impl MeshAnswerReport {
             MeshVerdict::Intersecting(contact) => Some(contact),
             _ => None,
         };
-        let (evidence, reason) = evidence_and_reason(&answer.verdict);
         let contacts = all.map(|(all, _)| all.reports());
+        let mut of_scans = AnswerReport::undecided(&answer.statistics, 0.0, micros);
+        of_scans.verdict = kind(&answer.verdict).word();
+        (of_scans.evidence, of_scans.reason) = evidence_and_reason(&answer.verdict);
+        of_scans.witness = contact.map(|contact| contact.point);
+        of_scans.normal_a = contact.map(|contact| contact.normals[0]);
+        of_scans.normal_b = contact.map(|contact| contact.normals[1]);
+        of_scans.gap = answer.verdict.is_separated().then_some(0.0);
+        of_scans.complete = all.map(|(_, complete)| complete);
+        of_scans.contact_count = contacts.as_ref().map(Vec::len);
+        of_scans.link = all.map(|(all, _)| all.link());
         Self {
-            verdict: kind(&answer.verdict).word(),
-            evidence,
-            reason,
-            witness: contact.map(|contact| contact.point),
-            normal_a: contact.map(|contact| contact.normals[0]),
-            normal_b: contact.map(|contact| contact.normals[1]),
-            residual: (),
-            source_a: (),
-            source_b: (),
-            gap: answer.verdict.is_separated().then_some(0.0),
-            distance_estimate: (),
-            band: 0.0,
-            likelihood: None,
+            answer: of_scans,
             probability: probability(answer),
             region: match answer.verdict {
                 MeshVerdict::Undecided(region) => Some(region),
                 _ => None,
             },
             triangles: contact.map(|contact| contact.triangles),
-            evaluations: answer.statistics.evaluations,
-            node_pairs: answer.statistics.node_pairs,
-            leaf_pairs: answer.statistics.leaf_pairs,
-            micros,
-            complete: all.map(|(_, complete)| complete),
-            contact_count: contacts.as_ref().map(Vec::len),
             contacts,
-            link: all.map(|(all, _)| all.link()),
             clashes: all.map(|(all, _)| all.clashes()),
         }
     }
 
     /// Returns a line of text with the triangles that meet and the work of the search.
     pub(crate) fn details(&self) -> String {
-        let between = self.triangles.map_or(String::new(), |triangles| between(triangles) + "; ");
-        let counts = [(self.node_pairs, "node pair"), (self.leaf_pairs, "leaf pair")];
-        format!("{between}{}", work(counts, self.micros))
+        let met = self.triangles.map_or(String::new(), |met| between(["triangle"; 2], met) + "; ");
+        format!("{met}{}", self.answer.details())
     }
 }
 
@@ -239,6 +193,6 @@ impl MeshDistanceReport {
     /// Returns a line of text with the nearest triangles and the work of the search.
     pub(crate) fn details(&self) -> String {
         let counts = [(self.node_pairs, "node pair"), (self.leaf_pairs, "leaf pair")];
-        format!("{}; {}", between(self.triangles), work(counts, self.micros))
+        format!("{}; {}", between(["triangle"; 2], self.triangles), work(counts, self.micros))
     }
 }

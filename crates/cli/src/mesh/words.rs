@@ -57,11 +57,6 @@ fn apart_by(found: &MeshDistance, unit: f64) -> String {
     }
 }
 
-/// Returns a clause that names two triangles.
-pub(crate) fn between([a, b]: [u32; 2]) -> String {
-    format!("between triangle {a} of a and triangle {b} of b (counted from 0)")
-}
-
 /// Returns a contact of a list as a line.
 pub(crate) fn contact_line(contact: &MeshContact, unit: f64) -> String {
     let [a, b] = contact.triangles;

@@ -16,6 +16,7 @@ mod independent;
 mod interpolating;
 mod looking_inside;
 mod making_poses;
+mod mesh_scans;
 mod meshes;
 mod on_disk;
 mod paths;

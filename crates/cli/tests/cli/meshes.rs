@@ -28,7 +28,7 @@ fn cube() -> String {
 }
 
 /// Returns a folder with a prepared cube.
-fn cubes() -> Place {
+pub(crate) fn cubes() -> Place {
     let place = Place::new();
     place.write("cube.obj", cube());
     place.ok(&["preprocess", "cube.obj", "-o", "cube.nm", "--as-mesh", "--quiet"]);
@@ -88,10 +88,22 @@ fn options_of_scans_do_not_apply_to_meshes() {
         for options in [&["--thickened", "0.1"][..], &["--surface-only"], &["--image", "x.png"]] {
             place.refused(2, &[&asked[..], &["both"], options].concat(), &["--as-mesh", options[0]]);
         }
-        for (which, other) in [("a", "b"), ("b", "a")] {
-            let words = [&format!("--as-mesh {which}: expected two meshes")[..], "--as-mesh both", other];
-            place.refused(2, &[&asked[..], &[which]].concat(), &words);
-        }
+        let refused = [&asked[..], &["a", "--image", "x.png"]].concat();
+        place.refused(
+            2,
+            &refused,
+            &["--as-mesh a: expected options that apply to a mesh and a scan", "--image"],
+        );
+    }
+    for options in [
+        &["--prove", "x"][..],
+        &["--resolution", "1"],
+        &["--method", "sampling"],
+        &["--order", "sides"],
+        &["--flat"],
+    ] {
+        let asked = ["collide", "cube.obj", "cube.obj", "--as-mesh", "b"];
+        place.refused(2, &[&asked[..], options].concat(), &["--as-mesh b", options[0]]);
     }
     place.refused(
         2,

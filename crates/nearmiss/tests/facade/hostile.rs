@@ -2,6 +2,7 @@
 //! bounded time. Answers are never wrong if checksums are compared.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tell what it counted")]
 
+mod cases;
 mod cost;
 mod damage;
 mod exercise;

@@ -11,12 +11,13 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::Pose;
-use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, Topology, descend, resume};
+use nearmiss_hierarchy::{Frontier, NodePair, Open, Stack, Topology, descend, resume};
 
 use crate::ask::options::CollideOptions;
 use crate::contact::certificate::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::contact::search::{Closer, Surfaces};
+use crate::pair::clearance::motion;
+use crate::pair::pairing::Pairing;
 use crate::pair::scan_pair::ScanPair;
 
 /// A frontier that has grown to this many times its fresh length is dropped: its nodes are smaller
@@ -107,14 +108,6 @@ impl PairHint {
     }
 }
 
-/// An upper bound on how far the motion between two poses moves any point of b.
-fn motion(pair: &ScanPair<'_>, from: &Pose, to: &Pose) -> f64 {
-    let Ball { centre, radius } = pair.b.outline.surface;
-    let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
-    let turn = (to.rotation() * to.scale() - from.rotation() * from.scale()).norm();
-    (shift + turn * radius) * (1.0 + 1e-9)
-}
-
 impl Known {
     fn nothing(question: Question) -> Self {
         Self {
@@ -135,7 +128,7 @@ impl Known {
     /// Records that b is at `pose`. If the travel is too long or NaN, everything but the question
     /// is forgotten.
     pub(crate) fn come_to(&mut self, pose: Pose, pair: &ScanPair<'_>) {
-        self.step = self.pose.map_or(f64::MAX, |from| motion(pair, &from, &pose));
+        self.step = self.pose.map_or(f64::MAX, |from| motion(&pair.b.outline.surface, &from, &pose));
         self.pose = Some(pose);
         // Rounded up so that no step is lost.
         let travel = if self.step > 0.0 { (self.travel + self.step).next_up() } else { self.travel };

@@ -12,7 +12,7 @@ use crate::pair::meter::Meter;
 use crate::pair::placed::{Placed, ViewScratch};
 
 /// Steps of either point; each costs two or three evaluations.
-const ROUNDS: u32 = 8;
+pub(crate) const ROUNDS: u32 = 8;
 
 /// A step is skipped if it would gain less than this share of the sampling radius.
 const ENOUGH: f64 = 1e-3;
@@ -58,22 +58,14 @@ impl Approach<'_, '_> {
     /// Moves one foot towards the other along its surface by `share` of the way, if that reduces
     /// the distance; otherwise halves `share`. Returns `false` if no step is worth trying.
     fn step(&mut self, side: usize, feet: &mut [Projection; 2], share: &mut f64) -> bool {
-        let view = self.views[side];
-        let radius = f64::from(view.scan().radii()[self.samples[side]]) * view.stored_to_world().scale();
+        let (view, sample) = (self.views[side], self.samples[side]);
         let to = between(feet) * [1.0, -1.0][side];
-        let (distance, normal) = (to.norm(), Vector3::from(feet[side].at.normal));
-        let along = to - normal * normal.dot(&to);
-        let length = along.norm();
-        if *share < SHORTEST || length * length.min(radius) <= ENOUGH * radius * distance {
-            return false;
-        }
-        let step = along * (*share * (radius / length).min(1.0));
-        let place = Vector3::from(feet[side].point) + step;
+        let Some(place) = step(view, sample, &feet[side], to, *share) else { return false };
         let mut next = *feet;
-        if let Some(foot) = self.land(side, place.into()) {
+        if let Some(foot) = self.land(side, place) {
             next[side] = foot;
         }
-        if between(&next).norm() < distance {
+        if between(&next).norm() < to.norm() {
             *feet = next;
         } else {
             *share *= 0.5;
@@ -81,26 +73,52 @@ impl Approach<'_, '_> {
         true
     }
 
-    /// Returns the verified surface point below `x`. If `x` is beyond a border of the surface,
-    /// projects the centroid of the last evaluation instead.
     fn land(&mut self, side: usize, x: [f64; 3]) -> Option<Projection> {
-        let foot = self.project(side, x)?;
-        if foot.at.status != Status::Border || foot.converged {
-            return Some(foot).filter(|foot| foot.converged);
-        }
-        self.project(side, foot.at.centroid).filter(|foot| foot.converged)
+        land(self.views[side], self.samples[side], x, &mut self.gathers[side], self.meter)
     }
+}
 
-    /// Projects `x` onto the surface. `None` once the budget is spent.
-    fn project(&mut self, side: usize, x: [f64; 3]) -> Option<Projection> {
-        if self.meter.go_on().is_break() {
+/// The point to which a foot on a surface steps, by `share` of its way towards the end of `to`, at
+/// most a local radius of `sample`. `None` if no step is worth trying.
+pub(crate) fn step(
+    view: &Placed<'_>,
+    sample: usize,
+    foot: &Projection,
+    to: Vector3<f64>,
+    share: f64,
+) -> Option<[f64; 3]> {
+    let radius = f64::from(view.scan().radii()[sample]) * view.stored_to_world().scale();
+    let (distance, normal) = (to.norm(), Vector3::from(foot.at.normal));
+    let along = to - normal * normal.dot(&to);
+    let length = along.norm();
+    if share < SHORTEST || length * length.min(radius) <= ENOUGH * radius * distance {
+        return None;
+    }
+    Some((Vector3::from(foot.point) + along * (share * (radius / length).min(1.0))).into())
+}
+
+/// Returns the verified surface point below `x`, near `sample`. If `x` is beyond a border of the
+/// surface, projects the centroid of the last evaluation instead. `None` once the budget is spent.
+pub(crate) fn land(
+    view: &Placed<'_>,
+    sample: usize,
+    x: [f64; 3],
+    scratch: &mut ViewScratch,
+    meter: &mut Meter,
+) -> Option<Projection> {
+    let mut project = |x| {
+        if meter.go_on().is_break() {
             return None;
         }
-        let (view, scratch) = (self.views[side], &mut self.gathers[side]);
-        let foot = project(x, |y| view.evaluate_near(self.samples[side], y, scratch));
-        self.meter.evaluated(u64::from(foot.evaluations));
+        let foot = project(x, |y| view.evaluate_near(sample, y, scratch));
+        meter.evaluated(u64::from(foot.evaluations));
         Some(foot)
+    };
+    let foot = project(x)?;
+    if foot.at.status != Status::Border || foot.converged {
+        return Some(foot).filter(|foot| foot.converged);
     }
+    project(foot.at.centroid).filter(|foot| foot.converged)
 }
 
 fn between(feet: &[Projection; 2]) -> Vector3<f64> {

@@ -131,11 +131,16 @@ pub(crate) struct Search<'m, P> {
 }
 
 impl<'m, P: Pairing> Search<'m, P> {
-    /// A search that starts from an arbitrary point pair, for the nearest points and, if
-    /// `of_enclosures`, the nearest enclosures of leaves.
-    pub(crate) fn new(pair: P, relative_pose: &'m RelativePose, of_enclosures: bool) -> Self {
+    /// A search that starts from the items `start`, for the nearest items and, if `of_enclosures`,
+    /// the nearest enclosures of leaves.
+    pub(crate) fn new(
+        pair: P,
+        relative_pose: &'m RelativePose,
+        start: [usize; 2],
+        of_enclosures: bool,
+    ) -> Self {
         let enclosures = if of_enclosures { f32::INFINITY } else { f32::NEG_INFINITY };
-        let best = pair.items([0, 0]);
+        let best = pair.items(start);
         let points = relative_pose.beyond(relative_pose.bound_of(best.distance));
         let (share, near_enough, stops_at_zero) = (None, f64::NEG_INFINITY, false);
         Self {

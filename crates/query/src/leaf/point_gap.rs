@@ -11,8 +11,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{NodePair, OrientedBox, Part, Relative, ScanArrays};
-use nearmiss_lanes::wide::{blocks_of, lanes_of, load};
+use nearmiss_lanes::wide::{bits, blocks_of, lanes_of, load};
 
+use crate::pair::pairing::Pairing;
 use crate::pair::scan_pair::ScanPair;
 
 /// Points of a leaf in lanes, in one of the two stored frames, with the reach of the obstacle about
@@ -50,6 +51,12 @@ impl<S: Simd> Balls<S> {
     /// The least distance of any ball from the box.
     #[inline(always)]
     fn gap_to_box(&self, simd: S, bounds: &OrientedBox) -> f32 {
+        self.least(simd, self.gaps_to_box(simd, bounds))
+    }
+
+    /// The distance of each ball from the box.
+    #[inline(always)]
+    fn gaps_to_box(&self, simd: S, bounds: &OrientedBox) -> f32x16<S> {
         let d = self.seen_from(bounds.centre);
         let mut beyond_sq = f32x16::splat(simd, 0.0);
         for k in 0..3 {
@@ -57,7 +64,7 @@ impl<S: Simd> Balls<S> {
             let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(0.0);
             beyond_sq += beyond * beyond;
         }
-        self.least(simd, beyond_sq.sqrt() - self.reaches)
+        beyond_sq.sqrt() - self.reaches
     }
 
     /// The least distance of any ball from any of `others`, in the same frame.
@@ -106,6 +113,26 @@ pub(crate) fn gap_of_leaf_and_box(
                 least = least.min(Balls::of(simd, scan, points, block).gap_to_box(simd, bounds));
             }
             least
+        },
+    ))
+}
+
+/// The lanes of a block of points, with a ball about each, that come within `most` of a box in the
+/// same frame.
+pub(crate) fn near_box(
+    level: Level,
+    (positions, balls, lanes): (&[[f32; 16]; 3], &[f32; 16], u32),
+    bounds: &OrientedBox,
+    most: f32,
+) -> u32 {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || {
+            let reaches = f32x16::load_array_ref(simd, balls);
+            let balls = Balls { centres: load(simd, positions), reaches, lanes };
+            // Not `<=`, which would be false for NaN.
+            let beyond: mask32x16<_> = balls.gaps_to_box(simd, bounds).simd_gt(most);
+            lanes & !bits(beyond)
         },
     ))
 }

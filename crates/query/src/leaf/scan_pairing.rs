@@ -2,13 +2,12 @@
 
 use fearless_simd::Level;
 use nearmiss_geometry::Pose;
-use nearmiss_hierarchy::{NodePair, Part};
+use nearmiss_hierarchy::{NodePair, Part, Relative, Tree};
 
 use crate::leaf::nearest_points::nearest;
-use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
 use crate::pair::pairing::{ItemPair, Pairing};
-use crate::pair::relative_pose::RelativePose;
+use crate::pair::placed::Placed;
 use crate::pair::scan_pair::{ScanPair, balls_apart};
 
 impl Pairing for ScanPair<'_> {
@@ -28,33 +27,20 @@ impl Pairing for ScanPair<'_> {
     }
 
     #[inline(always)]
-    fn slack(&self) -> f32 {
-        self.relative.slack()
+    fn relative(&self) -> &Relative {
+        &self.relative
     }
 
-    fn to_world(&self) -> f64 {
-        self.views[0].stored_to_world().scale()
-    }
-
-    fn relative_pose(&self, pose: &Pose) -> RelativePose {
-        Self::relative_pose(self, pose)
+    fn placed(&self) -> [&Pose; 2] {
+        self.views.map(Placed::stored_to_world)
     }
 
     #[inline(always)]
-    fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
+    fn both<'t>(&self) -> [&'t Tree<'t>; 2]
     where
         Self: 't,
     {
-        Self::bounds(self, relative_pose)
-    }
-
-    #[inline(always)]
-    fn which_are_leaves(&self, pair: NodePair) -> [bool; 2] {
-        Self::which_are_leaves(self, pair)
-    }
-
-    fn are_leaves(&self, pair: NodePair) -> bool {
-        Self::are_leaves(self, pair)
+        [&self.a.tree, &self.b.tree]
     }
 
     fn band_of(&self, nodes: NodePair) -> f64 {

@@ -1,23 +1,27 @@
-//! Many scans in one world, and the broad phase that finds the pairs that may meet.
+//! Many scans and meshes in one world, and the broad phase that finds the pairs that may meet.
 //!
 //! An R*-tree over world-space boxes prunes the pairs that are further apart than the reach of a
 //! question. It is that of the crate `rstar` (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree:
 //! an efficient and robust access method for points and rectangles", SIGMOD 1990).
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::convert::Infallible;
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Aabb, NodeId, Pose};
-use nearmiss_hierarchy::{Part, SLACK};
+use nearmiss_hierarchy::{OrientedBox, Part, SLACK};
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 use serde::{Deserialize, Serialize};
 
+use crate::many::body::{Body, BodyPair, PlacedBody};
+use crate::mesh::prepared::PreparedMesh;
 use crate::pair::placed::Placed;
+use crate::pair::placed_balls::is_proper;
 use crate::pair::prepared::Prepared;
 use crate::question::Pair;
 use crate::shape::Shape;
 
-/// The id of a placed scan in a [`World`]. Ids increase and are never reused, even after removals.
+/// The id of a placed scan or mesh in a [`World`]. Ids increase and are never reused, even after removals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct BodyId(pub u64);
 
@@ -31,10 +35,12 @@ pub enum Bodies<'a> {
     These(&'a [BodyId]),
 }
 
-/// Placed scans, each a *body* with an id.
+/// Placed scans and meshes, each a *body* with an id.
 ///
 /// `S` is what holds a preprocessed scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its
-/// graph and kernel are included. One scan may be placed many times.
+/// graph and kernel are included. One scan may be placed many times. `M` is what holds a preprocessed
+/// mesh, likewise; a world made with [`World::new`] has none, one made with [`World::with_meshes`] has
+/// both.
 ///
 /// ```
 /// use nearmiss_geometry::{PointCloud, Pose};
@@ -70,9 +76,42 @@ pub enum Bodies<'a> {
 /// assert!(pairs.iter().all(|&pair| pair[0] != floor || !touches(&world, pair)));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// With meshes, [`World::body_pair`] yields the pair that fits:
+///
+/// ```
+/// use nearmiss_geometry::{PointCloud, Pose, TriangleMesh};
+/// use nearmiss_hierarchy::{BuildOptions, MeshBuildOptions, MeshHierarchy, PointHierarchy};
+/// use nearmiss_query::{Bodies, BodyPair, CollideOptions, CollidePlan, MeshScanPlan, Scratch, World};
+///
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let floor = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let corners = vec![[0.0, 0.0, 0.0], [0.2, 0.0, 0.5], [-0.2, 0.0, 0.5]];
+/// let tip = TriangleMesh::new(corners, vec![[0, 1, 2]])?;
+/// let tip = MeshHierarchy::build(&tip, &MeshBuildOptions::default())?;
+///
+/// let mut world = World::with_meshes();
+/// world.insert(&floor, &Pose::IDENTITY);
+/// world.insert_mesh(&tip, &Pose::from_translation([0.5, 0.5, -0.1]));
+/// world.insert_mesh(&tip, &Pose::from_translation([0.5, 0.5, 0.2]));
+/// let options = CollideOptions::default();
+/// let plan = CollidePlan::new(&options, &floor, &floor)?;
+/// let of_mesh = MeshScanPlan::new(&options, &floor)?;
+///
+/// let (mut near, mut scratch) = (Vec::new(), Scratch::default());
+/// world.near_pairs(Bodies::All, plan.reach(), &mut near);
+/// let meets = near.iter().filter_map(|&pair| world.body_pair(pair)).map(|pair| match pair {
+///     BodyPair::Scans(pair) => pair.collide(&plan, &mut scratch).verdict.is_intersecting(),
+///     BodyPair::MeshAndScan { pair, .. } => pair.collide(&of_mesh, &mut scratch).verdict.is_intersecting(),
+///     BodyPair::Meshes(pair) => pair.collide(scratch.meshes()).verdict.is_intersecting(),
+/// });
+/// assert_eq!(meets.filter(|&meets| meets).count(), 2, "the lower tip meets the floor and the upper tip");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
-pub struct World<S> {
-    bodies: BTreeMap<BodyId, Body<S>>,
+pub struct World<S, M = Infallible> {
+    bodies: BTreeMap<BodyId, Entry<S, M>>,
     /// The bounding boxes of the bodies that have one.
     tree: RTree<Leaf>,
     /// The other bodies, which count as near everything.
@@ -81,20 +120,23 @@ pub struct World<S> {
 }
 
 #[derive(Debug, Clone)]
-struct Body<S> {
-    scan: S,
+struct Entry<S, M> {
+    body: Body<S, M>,
     pose: Pose,
     bounds: Option<Aabb>,
 }
 
-impl<S: Prepared> Body<S> {
-    fn new(scan: S, pose: &Pose) -> Self {
-        let bounds = bounds(&scan.at(pose));
-        Self { scan, pose: *pose, bounds }
+impl<S: Prepared, M: PreparedMesh> Entry<S, M> {
+    fn new(body: Body<S, M>, pose: &Pose) -> Self {
+        let bounds = match body.at(pose) {
+            PlacedBody::Scan(scan) => bounds(&scan),
+            PlacedBody::Mesh(mesh) => bounds_of(mesh.mesh().arrays().tree.root_box(), mesh.stored_to_world()),
+        };
+        Self { body, pose: *pose, bounds }
     }
 
-    fn placed(&self) -> Placed<'_> {
-        self.scan.at(&self.pose)
+    fn placed(&self) -> PlacedBody<'_> {
+        self.body.at(&self.pose)
     }
 }
 
@@ -123,49 +165,78 @@ impl RTreeObject for Leaf {
     }
 }
 
-impl<S> Default for World<S> {
+impl<S, M> Default for World<S, M> {
     fn default() -> Self {
         Self { bodies: BTreeMap::new(), tree: RTree::new(), unbounded: BTreeSet::new(), next: 0 }
     }
 }
 
 impl<S: Prepared> World<S> {
-    /// Creates a world without bodies.
+    /// Creates a world without bodies, for scans.
     #[must_use]
     pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+impl<S: Prepared, M: PreparedMesh> World<S, M> {
+    /// Creates a world without bodies, for scans and meshes.
+    #[must_use]
+    pub fn with_meshes() -> Self {
         Self::default()
     }
 
     /// Places `scan` at `pose`, which maps the frame of its input to the world. O(log n).
     pub fn insert(&mut self, scan: S, pose: &Pose) -> BodyId {
+        self.insert_body(Body::Scan(scan), pose)
+    }
+
+    /// Places `mesh` at `pose`, which maps the frame of its input to the world. O(log n).
+    pub fn insert_mesh(&mut self, mesh: M, pose: &Pose) -> BodyId {
+        self.insert_body(Body::Mesh(mesh), pose)
+    }
+
+    /// Places a scan or a mesh. O(log n).
+    pub fn insert_body(&mut self, body: Body<S, M>, pose: &Pose) -> BodyId {
         let id = BodyId(self.next);
         self.next += 1;
-        self.place(id, Body::new(scan, pose));
+        self.place(id, Entry::new(body, pose));
         id
     }
 
-    /// Removes a body and returns its scan; `None` if no body has this id. O(log n).
+    /// Removes a scan and returns it; `None` if no scan has this id. O(log n).
     pub fn remove(&mut self, id: BodyId) -> Option<S> {
-        let body = self.bodies.remove(&id)?;
-        match body.bounds {
+        if matches!(self.bodies.get(&id)?.body, Body::Mesh(_)) {
+            return None;
+        }
+        match self.remove_body(id)? {
+            Body::Scan(scan) => Some(scan),
+            Body::Mesh(_) => None,
+        }
+    }
+
+    /// Removes a body and returns what it is; `None` if no body has this id. O(log n).
+    pub fn remove_body(&mut self, id: BodyId) -> Option<Body<S, M>> {
+        let entry = self.bodies.remove(&id)?;
+        match entry.bounds {
             Some(bounds) => _ = self.tree.remove(&Leaf::new(id, &bounds)),
             None => _ = self.unbounded.remove(&id),
         }
-        Some(body.scan)
+        Some(entry.body)
     }
 
     /// Moves a body. Returns `false` if no body has this id. O(log n).
     pub fn move_to(&mut self, id: BodyId, pose: &Pose) -> bool {
-        let scan = self.remove(id);
-        scan.map(|scan| self.place(id, Body::new(scan, pose))).is_some()
+        let body = self.remove_body(id);
+        body.map(|body| self.place(id, Entry::new(body, pose))).is_some()
     }
 
-    fn place(&mut self, id: BodyId, body: Body<S>) {
-        match body.bounds {
+    fn place(&mut self, id: BodyId, entry: Entry<S, M>) {
+        match entry.bounds {
             Some(bounds) => self.tree.insert(Leaf::new(id, &bounds)),
             None => _ = self.unbounded.insert(id),
         }
-        self.bodies.insert(id, body);
+        self.bodies.insert(id, entry);
     }
 
     /// Returns the number of bodies.
@@ -186,16 +257,31 @@ impl<S: Prepared> World<S> {
         self.bodies.keys().copied()
     }
 
-    /// Returns a body as a placed scan, or `None` if no body has this id.
+    /// Returns a placed body, or `None` if no body has this id.
     #[must_use]
-    pub fn placed(&self, id: BodyId) -> Option<Placed<'_>> {
-        self.bodies.get(&id).map(Body::placed)
+    pub fn body(&self, id: BodyId) -> Option<PlacedBody<'_>> {
+        self.bodies.get(&id).map(Entry::placed)
     }
 
-    /// Returns a pair of bodies, or `None` if one of them does not exist.
+    /// Returns a body as a placed scan, or `None` if no scan has this id.
+    #[must_use]
+    pub fn placed(&self, id: BodyId) -> Option<Placed<'_>> {
+        match self.body(id)? {
+            PlacedBody::Scan(scan) => Some(scan),
+            PlacedBody::Mesh(_) => None,
+        }
+    }
+
+    /// Returns a pair of scans, or `None` if one of them does not exist or is a mesh.
     #[must_use]
     pub fn pair(&self, [a, b]: [BodyId; 2]) -> Option<Pair<'_>> {
         Some(Pair::new(self.placed(a)?, self.placed(b)?))
+    }
+
+    /// Returns a pair of bodies, whatever they are, or `None` if one of them does not exist.
+    #[must_use]
+    pub fn body_pair(&self, [a, b]: [BodyId; 2]) -> Option<BodyPair<'_>> {
+        Some(BodyPair::new(self.body(a)?, self.body(b)?))
     }
 
     /// Returns the world-space bounding box of a body in the broad phase; `None` if the body counts
@@ -322,8 +408,11 @@ const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
 /// The world-space bounding box of all parts of a scan that a query compares, enlarged by half of
 /// the rounding error that the query allows for. `None` if the pose is invalid or out of range.
 fn bounds(view: &Placed<'_>) -> Option<Aabb> {
-    let root = view.scan().tree().enclosure(Part::Surface, NodeId::ROOT);
-    let placed = view.stored_to_world();
+    bounds_of(&view.scan().tree().enclosure(Part::Surface, NodeId::ROOT), view.stored_to_world())
+}
+
+/// The same for a thing that is within `root` in its stored frame, which is `placed` in the world.
+fn bounds_of(root: &OrientedBox, placed: &Pose) -> Option<Aabb> {
     let scale = placed.scale();
     let centre = placed.apply(root.centre.map(f64::from));
     let edges = [0, 1, 2].map(|j: usize| {
@@ -342,5 +431,5 @@ fn bounds(view: &Placed<'_>) -> Option<Aabb> {
         Aabb { min: [0, 1, 2].map(|k| centre[k] - half[k]), max: [0, 1, 2].map(|k| centre[k] + half[k]) };
     let is_finite = bounds.min.iter().chain(&bounds.max).all(|x| x.abs() <= FARTHEST);
     let is_moderate = (1.0 / GREATEST_SCALE..=GREATEST_SCALE).contains(&scale);
-    (is_finite && is_moderate && view.is_proper()).then_some(bounds)
+    (is_finite && is_moderate && is_proper(placed)).then_some(bounds)
 }

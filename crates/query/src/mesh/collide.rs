@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 
 use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Plunging, Stack, descend};
 use nearmiss_lanes::wide::Bits;
-use nearmiss_mesh::triangles_meet;
+use nearmiss_mesh::{triangle_distance, triangles_meet};
 
 use crate::mesh::answer::{MeshAnswer, MeshContact, MeshVerdict};
+use crate::mesh::hint::MeshHint;
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::region::region;
 
@@ -48,22 +49,68 @@ impl PairVisitor for Search<'_, '_> {
 
 impl BoxVisitor for Search<'_, '_> {}
 
-/// Decides whether two meshes meet. `hint` has the triangles that met last.
+/// The same search, which also finds a lower bound of the distance of meshes that do not meet.
+struct Measuring<'x, 's, 'a> {
+    search: &'x mut Search<'s, 'a>,
+    /// The bound so far, in a's stored frame.
+    apart: f64,
+}
+
+impl PairVisitor for Measuring<'_, '_, '_> {
+    #[inline]
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.search.compared(pairs)
+    }
+
+    fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open) -> ControlFlow<()> {
+        let pair = &mut self.search.pair;
+        let (gaps, lanes) = (pair.least_distances(leaves), pair.lanes(leaves));
+        for lane in Bits(lanes) {
+            let mut gap = f64::from(gaps[lane]);
+            if gap <= 0.0 {
+                let triangles = MeshPairing::triangles(leaves, lane);
+                let [a, b] = pair.corners(triangles);
+                if triangles_meet(&a, &b) {
+                    self.search.met = Some(triangles);
+                    return ControlFlow::Break(());
+                }
+                gap = pair.to_stored(triangle_distance(&a, &b).distance);
+            }
+            self.apart = self.apart.min(gap);
+        }
+        pair.meter.go_on()
+    }
+}
+
+impl BoxVisitor for Measuring<'_, '_, '_> {
+    const NOTES_GAPS: bool = true;
+
+    #[inline]
+    fn least_apart(&mut self, least: f32) {
+        self.apart = self.apart.min(f64::from(least - self.search.pair.relative.slack()));
+    }
+}
+
+/// Decides whether two meshes meet, from what `hint` knows if possible.
 pub(crate) fn collide(
     pair: MeshPairing<'_>,
     stack: &mut Stack,
-    hint: Option<&mut Option<[u32; 2]>>,
+    mut hint: Option<&mut MeshHint>,
     contacts: Option<(&mut Vec<MeshContact>, &mut bool)>,
 ) -> MeshAnswer {
     stack.clear();
     let (all, complete) = contacts.unzip();
     let mut search = Search { pair, met: None, all };
-    let ended = search.run(stack, hint.as_deref().copied().flatten()).is_break();
+    let ended = match hint.as_deref_mut() {
+        Some(hint) => search.run_hinted(stack, hint),
+        None => search.run(stack),
+    };
+    let ended = ended.is_break();
     if let Some(complete) = complete {
         *complete = !ended;
     }
     if let Some(hint) = hint {
-        *hint = search.met.map(|met| met.map(nearmiss_lanes::id32));
+        hint.met = search.met.map(|met| met.map(nearmiss_lanes::id32));
     }
     let (verdict, likelihood) = match search.met.and_then(|met| search.pair.contact(met)) {
         Some(contact) => (MeshVerdict::Intersecting(contact), 1.0),
@@ -75,13 +122,28 @@ pub(crate) fn collide(
 
 impl Search<'_, '_> {
     /// Searches from the pair of the roots on. Breaks if it was ended.
-    fn run(&mut self, stack: &mut Stack, hint: Option<[u32; 2]>) -> ControlFlow<()> {
+    fn run(&mut self, stack: &mut Stack) -> ControlFlow<()> {
         if self.pair.gap > 0.0 {
             return ControlFlow::Continue(());
         }
         self.pair.meter.go_on()?;
-        if self.all.is_none()
-            && let Some([i, j]) = hint.map(|hint| hint.map(|i| i as usize))
+        let (relative, level) = (self.pair.relative, self.pair.level);
+        let trees = self.pair.trees(&relative);
+        if self.all.is_none() {
+            descend(trees, level, &mut Plunging::new(stack), self)
+        } else {
+            descend(trees, level, stack, self)
+        }
+    }
+
+    /// The same for one contact, from what is known. Updates the clearance.
+    fn run_hinted(&mut self, stack: &mut Stack, hint: &mut MeshHint) -> ControlFlow<()> {
+        if self.pair.is_clear(hint.clear.as_ref()) {
+            return ControlFlow::Continue(());
+        }
+        hint.clear = None;
+        self.pair.meter.go_on()?;
+        if let Some([i, j]) = hint.met.map(|met| met.map(|i| i as usize))
             && i < self.pair.a.triangles.len()
             && j < self.pair.b.triangles.len()
         {
@@ -92,11 +154,16 @@ impl Search<'_, '_> {
             }
         }
         let (relative, level) = (self.pair.relative, self.pair.level);
-        let trees = self.pair.trees(&relative);
-        if self.all.is_none() {
-            descend(trees, level, &mut Plunging::new(stack), self)
+        let balls = self.pair.gap / self.pair.meshes[0].stored_to_world().scale();
+        let mut measuring = Measuring { search: self, apart: f64::INFINITY };
+        if balls > 0.0 {
+            measuring.apart = balls;
         } else {
-            descend(trees, level, stack, self)
+            let trees = measuring.search.pair.trees(&relative);
+            descend(trees, level, &mut Plunging::new(stack), &mut measuring)?;
         }
+        let apart = measuring.apart;
+        hint.clear = self.pair.clearance(apart);
+        ControlFlow::Continue(())
     }
 }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ask::answer::Statistics;
 use crate::distance::{Frontier, Nearness};
+use crate::mesh::hint::MeshHint;
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::pair::bounds::{BoundVisitor, Bounds};
 use crate::pair::relative_pose::{Limits, RelativePose};
@@ -110,17 +111,17 @@ impl BoundVisitor<Nearness> for Search<'_, '_> {
     }
 }
 
-/// Bounds the distance of two meshes. `hint` has the nearest triangles of the last query.
+/// Bounds the distance of two meshes, from the nearest triangles of the last query if `hint` is given.
 pub(crate) fn distance(
     pair: MeshPairing<'_>,
     open: &mut Frontier,
-    hint: Option<&mut Option<[u32; 2]>>,
+    hint: Option<&mut MeshHint>,
 ) -> MeshDistance {
     let relative_pose = pair.relative_pose();
     let (trees, level) = ([&pair.a.tree, &pair.b.tree], pair.level);
     let best = Nearest { distance: f64::INFINITY, points: [[0.0; 3]; 2], triangles: [0; 2] };
     let mut search = Search { pair, relative_pose: &relative_pose, best, limit: f32::INFINITY };
-    let known = hint.as_deref().copied().flatten().map(|hint| hint.map(|i| i as usize));
+    let known = hint.as_ref().and_then(|hint| hint.nearest).map(|hint| hint.map(|i| i as usize));
     let counts = [search.pair.a.triangles.len(), search.pair.b.triangles.len()];
     search.compare(known.filter(|known| known[0] < counts[0] && known[1] < counts[1]).unwrap_or_default());
 
@@ -140,7 +141,9 @@ pub(crate) fn distance(
         relative_pose.proven(relative_pose.bound(least)).min(upper)
     };
     if let Some(hint) = hint {
-        *hint = Some(triangles.map(nearmiss_lanes::id32));
+        hint.nearest = Some(triangles.map(nearmiss_lanes::id32));
+        let scale = search.pair.meshes[0].stored_to_world().scale();
+        hint.clear = search.pair.clearance(lower * (1.0 - 1e-9) / scale);
     }
     let pose = search.pair.meshes[0].pose();
     MeshDistance {

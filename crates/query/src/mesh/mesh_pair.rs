@@ -9,6 +9,7 @@ use crate::ask::budget::Budget;
 use crate::mesh::answer::MeshContact;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::triangle_pairs::{least_distances, may_meet};
+use crate::pair::clearance::Clearance;
 use crate::pair::meter::Meter;
 use crate::pair::placed_balls::PlacedBalls;
 use crate::pair::relative_pose::RelativePose;
@@ -51,6 +52,29 @@ impl<'a> MeshPairing<'a> {
         let meter = Meter::of_leaves(budget, leaves, LEAF_PAIR);
         let gap = balls.gap;
         Some(Self { meshes, a, b, stored, relative, pose, gap, meter, level })
+    }
+
+    /// The identities of both meshes.
+    fn things(&self) -> [u64; 2] {
+        self.meshes.map(|placed| placed.mesh().identity())
+    }
+
+    /// Returns `true` if a separation at an earlier pose still holds.
+    pub(crate) fn is_clear(&self, known: Option<&Clearance>) -> bool {
+        let left =
+            known.and_then(|known| known.at(self.things(), &self.stored, self.b.ball, self.relative.slack()));
+        left.is_some_and(|left| left > 0.0)
+    }
+
+    /// Remembers a separation by `distance`, in a's stored frame. `None` if that is too small to be of
+    /// use.
+    pub(crate) fn clearance(&self, distance: f64) -> Option<Clearance> {
+        Clearance::new(self.things(), &self.stored, distance - f64::from(self.relative.slack()))
+    }
+
+    /// Converts a length from the frame of a's input to a's stored frame.
+    pub(crate) fn to_stored(&self, length: f64) -> f64 {
+        length / self.meshes[0].mesh().frame().scale
     }
 
     /// The trees of both meshes, for a descent that prunes pairs whose boxes are disjoint.

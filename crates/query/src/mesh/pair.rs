@@ -10,6 +10,7 @@ use crate::mesh::answer::{MeshAnswer, MeshContact, MeshVerdict};
 use crate::mesh::cell_table::{CellTable, MOST_SHARED};
 use crate::mesh::collide::collide;
 use crate::mesh::distance::{MeshDistance, distance};
+use crate::mesh::hint::MeshHint;
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::quality::MeshQuality;
@@ -48,14 +49,6 @@ impl MeshScratch {
             table: None,
         }
     }
-}
-
-/// The triangles that met, or were nearest, in the last query of a pair of meshes. The next query
-/// compares them first. A hint never changes a verdict or a distance.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct MeshHint {
-    met: Option<[u32; 2]>,
-    nearest: Option<[u32; 2]>,
 }
 
 /// Two placed meshes and the budget of each question about them.
@@ -134,10 +127,12 @@ impl<'a> MeshPair<'a> {
         self.ask(*level, |pair| time_critical::collide(pair, quality, table, (heap, left))).unwrap_or(INVALID)
     }
 
-    /// Like [`Self::collide`], but tries the triangles of `hint` first, and updates it.
+    /// Like [`Self::collide`], but starts from `hint`, and updates it. Takes no search if the triangles
+    /// of the last contact still meet, or while separated meshes have moved by less than the distance
+    /// that the last search or [`Self::distance_hinted`] proved.
     pub fn collide_hinted(&self, hint: &mut MeshHint, scratch: &mut MeshScratch) -> MeshAnswer {
         let MeshScratch { level, stack, .. } = scratch;
-        self.ask(*level, |pair| collide(pair, stack, Some(&mut hint.met), None)).unwrap_or(INVALID)
+        self.ask(*level, |pair| collide(pair, stack, Some(hint), None)).unwrap_or(INVALID)
     }
 
     /// Finds every pair of triangles that meet and writes their contacts to `contacts`, as far as
@@ -166,7 +161,7 @@ impl<'a> MeshPair<'a> {
     /// query, and updates it. Much faster if the poses changed little.
     pub fn distance_hinted(&self, hint: &mut MeshHint, scratch: &mut MeshScratch) -> MeshDistance {
         let MeshScratch { level, open, .. } = scratch;
-        self.ask(*level, |pair| distance(pair, open, Some(&mut hint.nearest))).unwrap_or(UNKNOWN)
+        self.ask(*level, |pair| distance(pair, open, Some(hint))).unwrap_or(UNKNOWN)
     }
 
     /// Calls `ask` with the pair under its relative pose; `None` if a pose is invalid.

@@ -8,6 +8,7 @@ use crate::ask::options::{CollideOptions, Order, Semantics};
 use crate::contact::certificate::Certifier;
 use crate::contact::collide::{ContactScratch, Frontiers, apart};
 use crate::mesh::placed::PlacedMesh;
+use crate::mesh_scan::hint::MeshScanHint;
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
 use crate::mesh_scan::plan::MeshScanPlan;
 use crate::mesh_scan::search::Search;
@@ -28,7 +29,7 @@ pub(crate) struct AskedOfMesh<'q> {
 pub(crate) fn collide(
     asked: AskedOfMesh<'_>,
     scratch: &mut ContactScratch,
-    mut contacts: Option<&mut Contacts>,
+    (hint, mut contacts): (Option<&mut MeshScanHint>, Option<&mut Contacts>),
 ) -> Answer {
     let AskedOfMesh { scan, mesh, plan, budget } = asked;
     let options = plan.options();
@@ -51,9 +52,16 @@ pub(crate) fn collide(
         let statistics = Statistics { node_pairs: 1, ..Statistics::default() };
         return Answer { verdict, band, distance_estimate: None, statistics };
     }
+    if let Some(distance) = hint.as_ref().and_then(|hint| hint.distance(&pair, options, plan.reach())) {
+        if let Some(contacts) = contacts {
+            contacts.complete = true;
+        }
+        let (verdict, band) = (apart_by(options, distance), pair.band_of_node(NodePair::ROOTS));
+        return Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent };
+    }
     match options.semantics {
-        Semantics::Obstacle | Semantics::Surface => surfaces(pair, options, budget, scratch, contacts),
-        Semantics::Thickened(_) => thickened(pair, plan, scratch, contacts),
+        Semantics::Obstacle | Semantics::Surface => surfaces(pair, asked, scratch, (hint, contacts)),
+        Semantics::Thickened(_) => thickened(pair, plan, scratch, (hint, contacts)),
     }
 }
 
@@ -71,11 +79,11 @@ fn apart_by(options: &CollideOptions, distance: f64) -> Verdict {
 /// is requested.
 fn surfaces(
     pair: MeshScanPairing<'_>,
-    options: &CollideOptions,
-    budget: &Budget,
+    AskedOfMesh { plan, budget, .. }: AskedOfMesh<'_>,
     scratch: &mut ContactScratch,
-    contacts: Option<&mut Contacts>,
+    (hint, contacts): (Option<&mut MeshScanHint>, Option<&mut Contacts>),
 ) -> Answer {
+    let options = plan.options();
     let ContactScratch { frontiers, gathers: [gather, _], compared, proven, proof, .. } = scratch;
     let (all, complete) = contacts.map(Contacts::parts).unzip();
     let (stored, relative, level) = (pair.stored, pair.relative, pair.level);
@@ -84,7 +92,10 @@ fn surfaces(
     let Frontiers { stack, heap } = frontiers;
     let trees = search.pair.trees(&relative, search.reach);
     let by_overlap = options.order.map_or(budget.may_end(), |by| by != Order::DepthFirst);
-    let flow = if by_overlap {
+    let before = search.compare_first(hint.as_ref().and_then(|hint| hint.met));
+    let flow = if before.is_break() {
+        before
+    } else if by_overlap {
         descend(trees, level, heap, &mut search)
     } else if search.wants_any() {
         descend(trees, level, &mut Plunging::new(stack), &mut search)
@@ -96,7 +107,8 @@ fn surfaces(
         *complete = !ended;
     }
     let Search { mut pair, found, met, doubt, reach, .. } = search;
-    let mut band = met.map_or_else(|| pair.band_of_node(NodePair::ROOTS), |i| pair.band(i));
+    let mut band = met.map_or_else(|| pair.band_of_node(NodePair::ROOTS), |[i, _]| pair.band(i));
+    let mut clear = None;
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
@@ -108,12 +120,15 @@ fn surfaces(
         _ => {
             let mut certifier = Certifier::new(&mut pair, reach, proven);
             let proven = certifier.prove(&stored, compared, proof, (None, false));
-            if let Some((_, near)) = proven {
-                band = near;
+            if let Some((distance, near)) = proven {
+                (band, clear) = (near, Some(distance));
             }
             apart(options, proven.map_or(0.0, |(distance, _)| distance), proven.is_some())
         }
     };
+    if let Some(hint) = hint {
+        hint.keep(&pair, options, clear, met.map(|met| pair.leaves_of(met)));
+    }
     scratch.longest_stretch = pair.meter.longest_stretch;
     Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent }
 }
@@ -123,7 +138,7 @@ fn thickened(
     pair: MeshScanPairing<'_>,
     plan: &MeshScanPlan,
     scratch: &mut ContactScratch,
-    contacts: Option<&mut Contacts>,
+    (hint, contacts): (Option<&mut MeshScanHint>, Option<&mut Contacts>),
 ) -> Answer {
     let (all, complete) = contacts.map(Contacts::parts).unzip();
     let (relative, level) = (pair.relative, pair.level);
@@ -131,7 +146,10 @@ fn thickened(
     scratch.frontiers.clear();
     let Frontiers { stack, .. } = &mut scratch.frontiers;
     let trees = search.pair.trees(&relative, search.reach_stored);
-    let flow = if search.all.is_none() {
+    let before = search.compare_first(hint.as_ref().and_then(|hint| hint.met));
+    let flow = if before.is_break() {
+        before
+    } else if search.all.is_none() {
         descend(trees, level, &mut Plunging::new(stack), &mut search)
     } else {
         descend(trees, level, stack, &mut search)
@@ -150,7 +168,11 @@ fn thickened(
         }
         None => apart_by(plan.options(), apart),
     };
-    let band = found.map_or_else(|| pair.band_of_node(NodePair::ROOTS), |(_, i)| pair.band(i));
+    let band = found.map_or_else(|| pair.band_of_node(NodePair::ROOTS), |(_, [i, _])| pair.band(i));
+    if let Some(hint) = hint {
+        let clear = verdict.is_separated().then_some(apart);
+        hint.keep(&pair, plan.options(), clear, found.map(|(_, met)| pair.leaves_of(met)));
+    }
     scratch.longest_stretch = pair.meter.longest_stretch;
     Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent }
 }

@@ -7,6 +7,7 @@ use nearmiss_index::PointBlock;
 use nearmiss_lanes::wide::{Bits, blocks_of, lanes_of};
 use nearmiss_mesh::{Corners, nearest_on_triangle};
 
+use crate::leaf::point_gap::near_box;
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
 use crate::mesh_scan::triangle_lanes::LeafTriangles;
 use crate::pair::pairing::ItemPair;
@@ -65,18 +66,26 @@ impl MeshScanPairing<'_> {
         let points = &self.a.tree.topology().points(leaves.a);
         let relative = self.relative;
         let triangles = LeafTriangles { level: self.level, block: &self.b.blocks[leaf], relative: &relative };
-        // The box contains the balls.
+        // The box of the points contains their balls.
         let bounds = self.a.tree.bounds(leaves.a);
+        let beside = relative.moved(&self.b.tree.bounds(leaves.b));
         let mut most = self.most(best.distance);
         for block in blocks_of(points) {
             let balls = if self.part == Part::Obstacle { self.a.obstacle_balls(block) } else { [0.0; WIDTH] };
             let positions = &self.a.blocks[block].position;
-            let Some(gaps) = triangles.point_gaps(positions, &balls, &bounds, most) else { continue };
+            let of_block = (positions, &balls, lanes_of(block, points));
+            // Most points are too far from all triangles.
+            let near = near_box(self.level, of_block, &beside, most + 3.0 * relative.slack());
+            if near == 0 {
+                continue;
+            }
+            let Some((gaps, lanes)) = triangles.point_gaps((positions, &balls, near), &bounds, most) else {
+                continue;
+            };
             for lane in self.lanes(leaf) {
-                let gaps = &gaps[lane];
-                let mut left = lanes_of(block, points);
+                let (gaps, mut left) = (&gaps[lane], lanes[lane]);
                 let mut corners = None;
-                while let Some(i) = Bits(left).min_by(|&i, &j| gaps[i].total_cmp(&gaps[j])) {
+                while let Some(i) = nearest_lane(gaps, left) {
                     left &= !(1 << i);
                     if gaps[i] > most {
                         break;
@@ -101,4 +110,17 @@ impl MeshScanPairing<'_> {
         let most = (distance / self.scan.stored_to_world().scale()) as f32;
         most + 1e-6 * most.abs() + self.relative.slack()
     }
+}
+
+/// The lane among `lanes` with the least gap; the first among equals. `None` if there are none.
+#[inline]
+fn nearest_lane(gaps: &[f32; WIDTH], lanes: u32) -> Option<usize> {
+    let mut lanes = Bits(lanes);
+    let mut least = lanes.next()?;
+    for lane in lanes {
+        if gaps[lane].total_cmp(&gaps[least]).is_lt() {
+            least = lane;
+        }
+    }
+    Some(least)
 }

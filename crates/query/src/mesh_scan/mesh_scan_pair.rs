@@ -79,6 +79,16 @@ impl<'a> MeshScanPairing<'a> {
         })
     }
 
+    /// The identities of the scan and the mesh.
+    pub(crate) fn things(&self) -> [u64; 2] {
+        [self.a.outline.identity, self.mesh.mesh().identity()]
+    }
+
+    /// The leaves of a point and a triangle.
+    pub(crate) fn leaves_of(&self, [i, j]: [usize; 2]) -> NodePair {
+        NodePair { a: self.a.tree.topology().leaf_of(i), b: self.b.tree.topology().leaf_of(j) }
+    }
+
     /// Both trees, for a descent that prunes pairs whose boxes are further apart than `reach`, in
     /// the scan's stored frame.
     pub(crate) fn trees<'t>(&self, relative: &'t Relative, reach: f32) -> TreePair<'t>

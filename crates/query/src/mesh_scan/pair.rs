@@ -6,6 +6,7 @@ use crate::distance::{Distance, DistancePlan};
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh_scan::collide::{AskedOfMesh, collide};
 use crate::mesh_scan::distance::distance;
+use crate::mesh_scan::hint::MeshScanHint;
 use crate::mesh_scan::plan::MeshScanPlan;
 use crate::pair::placed::Placed;
 use crate::question::Scratch;
@@ -99,7 +100,18 @@ impl<'a> MeshScanPair<'a> {
     /// Does not allocate once `scratch` is warm. Deterministic: a question without a deadline
     /// always has the same answer.
     pub fn collide(&self, plan: &MeshScanPlan, scratch: &mut Scratch) -> Answer {
-        collide(self.asked(plan), &mut scratch.contact, None)
+        collide(self.asked(plan), &mut scratch.contact, (None, None))
+    }
+
+    /// Like [`Self::collide`], but starts from what `hint` knows, and updates it; see
+    /// [`MeshScanHint`].
+    pub fn collide_hinted(
+        &self,
+        plan: &MeshScanPlan,
+        hint: &mut MeshScanHint,
+        scratch: &mut Scratch,
+    ) -> Answer {
+        collide(self.asked(plan), &mut scratch.contact, (Some(hint), None))
     }
 
     /// Like [`Self::collide`], but continues after the first contact and writes one contact per pair
@@ -107,7 +119,7 @@ impl<'a> MeshScanPair<'a> {
     /// lasts. The contacts are accurate to first order; that of the answer is the first of a few
     /// that is certified, or else the first.
     pub fn contacts(&self, plan: &MeshScanPlan, contacts: &mut Contacts, scratch: &mut Scratch) -> Answer {
-        collide(self.asked(plan), &mut scratch.contact, Some(contacts))
+        collide(self.asked(plan), &mut scratch.contact, (None, Some(contacts)))
     }
 
     /// Bounds the distance of the scan and the mesh: lower ≤ distance ≤ upper. Both bounds are valid
@@ -123,7 +135,19 @@ impl<'a> MeshScanPair<'a> {
     /// Does not allocate once `scratch` is warm.
     pub fn distance(&self, plan: &DistancePlan, scratch: &mut Scratch) -> Distance {
         let Scratch { contact, distance: open, .. } = scratch;
-        distance((&self.scan, &self.mesh), plan, &self.budget, open, contact)
+        distance((&self.scan, &self.mesh), plan, &self.budget, (open, contact), None)
+    }
+
+    /// Like [`Self::distance`], but starts from the nearest point and triangle of the last query, and
+    /// updates them. Of several nearest ones, others may be found.
+    pub fn distance_hinted(
+        &self,
+        plan: &DistancePlan,
+        hint: &mut MeshScanHint,
+        scratch: &mut Scratch,
+    ) -> Distance {
+        let Scratch { contact, distance: open, .. } = scratch;
+        distance((&self.scan, &self.mesh), plan, &self.budget, (open, contact), Some(hint))
     }
 
     fn asked<'q>(&'q self, plan: &'q MeshScanPlan) -> AskedOfMesh<'q> {

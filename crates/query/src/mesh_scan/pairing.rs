@@ -1,15 +1,13 @@
 //! A scan and a mesh as a [`Pairing`].
 
 use fearless_simd::Level;
-use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{NodePair, Part, ScanArrays};
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::{NodePair, Part, Relative, Tree};
 
 use crate::leaf::point_gap::gap_of_leaf_and_box;
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
-use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
 use crate::pair::pairing::{ItemPair, Pairing};
-use crate::pair::relative_pose::RelativePose;
 
 impl Pairing for MeshScanPairing<'_> {
     #[inline(always)]
@@ -28,35 +26,20 @@ impl Pairing for MeshScanPairing<'_> {
     }
 
     #[inline(always)]
-    fn slack(&self) -> f32 {
-        self.relative.slack()
+    fn relative(&self) -> &Relative {
+        &self.relative
     }
 
-    fn to_world(&self) -> f64 {
-        self.scan.stored_to_world().scale()
-    }
-
-    fn relative_pose(&self, pose: &Pose) -> RelativePose {
-        let roots = [self.a.tree.root_box(), self.b.tree.root_box()];
-        RelativePose::new(roots, [self.scan.stored_to_world(), self.mesh.stored_to_world()], pose)
+    fn placed(&self) -> [&Pose; 2] {
+        [self.scan.stored_to_world(), self.mesh.stored_to_world()]
     }
 
     #[inline(always)]
-    fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
+    fn both<'t>(&self) -> [&'t Tree<'t>; 2]
     where
         Self: 't,
     {
-        Bounds { trees: [&self.a.tree, &self.b.tree], relative_pose, part: self.part }
-    }
-
-    #[inline(always)]
-    fn which_are_leaves(&self, pair: NodePair) -> [bool; 2] {
-        [self.a.tree.topology().is_leaf(pair.a), self.b.tree.topology().is_leaf(pair.b)]
-    }
-
-    fn are_leaves(&self, pair: NodePair) -> bool {
-        let [a, b] = [self.a.tree.topology(), self.b.tree.topology()];
-        a.has(pair.a) && b.has(pair.b) && self.which_are_leaves(pair) == [true; 2]
+        [&self.a.tree, &self.b.tree]
     }
 
     fn band_of(&self, nodes: NodePair) -> f64 {
@@ -85,12 +68,9 @@ impl Pairing for MeshScanPairing<'_> {
 
     #[inline]
     fn gap_by_points(&self, pair: NodePair) -> Option<f32> {
-        let is_loose = |scan: &ScanArrays<'_>, leaf: NodeId| {
-            scan.leaves.is_loose(scan.tree.topology().leaf_number(leaf))
-        };
         match self.which_are_leaves(pair) {
             [true, true] => Some(self.gap_of_two_leaves(pair)),
-            [true, false] if is_loose(self.a, pair.a) => Some(self.gap_of_leaf_boxes(pair)),
+            [true, false] => Some(self.gap_of_leaf_boxes(pair)),
             _ => None,
         }
     }

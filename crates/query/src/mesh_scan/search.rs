@@ -8,7 +8,7 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Part, THICKNESS};
+use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Part, THICKNESS, Tree};
 use nearmiss_lanes::wide::{Bits, blocks_of, lanes_of};
 use nearmiss_mesh::{Corners, unit_normal};
 
@@ -43,8 +43,8 @@ pub(crate) struct Search<'s, 'a> {
     tries: u32,
     /// The best contact so far.
     pub(crate) found: Option<(Contact, Evidence)>,
-    /// The point of the first contact.
-    pub(crate) met: Option<usize>,
+    /// The point and the triangle of the first contact.
+    pub(crate) met: Option<[usize; 2]>,
     /// All contacts, one per leaf pair that meets, if requested.
     pub(crate) all: Option<&'s mut Vec<Contact>>,
     /// Why the query stays undecided if nothing else meets.
@@ -84,6 +84,21 @@ impl<'s, 'a> Search<'s, 'a> {
         self.detail == Detail::Verdict
             || self.tries >= TRIES
             || self.found.is_some_and(|(_, evidence)| evidence == Evidence::Certified)
+    }
+
+    /// Compares the leaves that met last, if there are any and one contact will do. Breaks if they
+    /// settle the question.
+    pub(crate) fn compare_first(&mut self, met: Option<NodePair>) -> ControlFlow<()> {
+        let Some(nodes) = met.filter(|&nodes| self.all.is_none() && self.pair.are_leaves(nodes)) else {
+            return ControlFlow::Continue(());
+        };
+        let number = |tree: &Tree<'_>, node| tree.topology().leaf_number(node);
+        let flow =
+            self.compare([number(&self.pair.a.tree, nodes.a), number(&self.pair.b.tree, nodes.b)], nodes);
+        if let Some(compared) = &mut self.compared {
+            compared.clear();
+        }
+        flow
     }
 
     /// Compares the points of a leaf with the triangles of another and records a contact.
@@ -129,13 +144,13 @@ impl<'s, 'a> Search<'s, 'a> {
             .any(|(block, _, count)| discs_reach_box(pair.level, (block, count), &bounds, most))
     }
 
-    /// Records a contact of point `i`, first with the evidence so far.
-    fn record(&mut self, i: usize, contact: Contact, evidence: Evidence) {
+    /// Records a contact of a point and a triangle, first with the evidence so far.
+    fn record(&mut self, items: [usize; 2], contact: Contact, evidence: Evidence) {
         if self.found.is_none_or(|(_, known)| known == Evidence::Estimated && evidence == Evidence::Certified)
         {
             self.found = Some((contact, evidence));
         }
-        self.met.get_or_insert(i);
+        self.met.get_or_insert(items);
     }
 
     /// The first contact of a ball and a triangle of two leaves. Records it. Notes a doubt where a
@@ -171,7 +186,7 @@ impl<'s, 'a> Search<'s, 'a> {
                         continue;
                     }
                     let contact = self.contact_of_ball([i, j], foot, (distance, ball));
-                    self.record(i, contact, Evidence::Certified);
+                    self.record([i, j], contact, Evidence::Certified);
                     return Some(contact);
                 }
             }
@@ -231,8 +246,8 @@ impl<'s, 'a> Search<'s, 'a> {
                     let certified = if is_settled { None } else { self.verify(&contact, [i, j], start) };
                     first.get_or_insert(contact);
                     match certified {
-                        Some(certified) => self.record(i, certified, Evidence::Certified),
-                        None => self.record(i, contact, Evidence::Estimated),
+                        Some(certified) => self.record([i, j], certified, Evidence::Certified),
+                        None => self.record([i, j], contact, Evidence::Estimated),
                     }
                     if is_settled || certified.is_some() || self.pair.meter.go_on().is_break() {
                         return first;

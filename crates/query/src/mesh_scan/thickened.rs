@@ -3,11 +3,11 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{BoxVisitor, Open, PairVisitor};
+use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Tree};
 
 use crate::ask::answer::Contact;
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
-use crate::pair::pairing::ItemPair;
+use crate::pair::pairing::{ItemPair, Pairing};
 
 /// The search for a point within `reach` of a triangle.
 pub(crate) struct Thickened<'s, 'a> {
@@ -18,8 +18,8 @@ pub(crate) struct Thickened<'s, 'a> {
     pub(crate) reach_stored: f32,
     /// The nearest such point and triangle of each leaf pair, if all contacts are requested.
     pub(crate) all: Option<&'s mut Vec<Contact>>,
-    /// The first such contact and its point.
-    pub(crate) found: Option<(Contact, usize)>,
+    /// The first such contact, its point and its triangle.
+    pub(crate) found: Option<(Contact, [usize; 2])>,
     /// A lower bound of the distance of all that was compared or pruned, in the world.
     pub(crate) apart: f64,
 }
@@ -39,9 +39,28 @@ impl PairVisitor for Thickened<'_, '_> {
     }
 
     fn leaf_pair(&mut self, leaves: [usize; 2], open: &Open) -> ControlFlow<()> {
+        self.compare(leaves, open.pair)
+    }
+}
+
+impl Thickened<'_, '_> {
+    /// Compares the leaves that met last, if there are any and one contact will do. Breaks if they
+    /// meet again.
+    pub(crate) fn compare_first(&mut self, met: Option<NodePair>) -> ControlFlow<()> {
+        let Some(nodes) = met.filter(|&nodes| self.all.is_none() && self.pair.are_leaves(nodes)) else {
+            return ControlFlow::Continue(());
+        };
+        let number = |tree: &Tree<'_>, node| tree.topology().leaf_number(node);
+        let flow =
+            self.compare([number(&self.pair.a.tree, nodes.a), number(&self.pair.b.tree, nodes.b)], nodes);
+        self.apart = f64::INFINITY;
+        flow
+    }
+
+    fn compare(&mut self, leaves: [usize; 2], nodes: NodePair) -> ControlFlow<()> {
         self.pair.count(leaves);
         let best = ItemPair { distance: self.apart, items: [0; 2] };
-        let ItemPair { distance, items } = self.pair.nearest_items(open.pair, best);
+        let ItemPair { distance, items } = self.pair.nearest_items(nodes, best);
         if distance > self.reach || distance == self.apart {
             self.apart = distance;
             return self.pair.meter.go_on();
@@ -54,7 +73,7 @@ impl PairVisitor for Thickened<'_, '_> {
             residual: 0.5 * distance,
             sources: self.pair.sources(items),
         };
-        self.found.get_or_insert((contact, items[0]));
+        self.found.get_or_insert((contact, items));
         let Some(all) = &mut self.all else { return ControlFlow::Break(()) };
         all.push(contact);
         self.pair.meter.go_on()

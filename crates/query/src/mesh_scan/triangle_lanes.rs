@@ -398,18 +398,18 @@ impl LeafTriangles<'_> {
         least
     }
 
-    /// Lower bounds on the distances of points from each triangle, less their balls. `None` if no
-    /// triangle is within `most` of the box of the points.
+    /// Lower bounds on the distances of points from each triangle, less their balls, and the lanes of
+    /// those that are at most `most`. `points` has positions, balls and the lanes in use. `None` if
+    /// no triangle is within `most` of the box of the points.
     pub(crate) fn point_gaps(
         &self,
-        positions: &[[f32; 16]; 3],
-        balls: &[f32; 16],
+        points: Reaching<'_>,
         bounds: &OrientedBox,
         most: f32,
-    ) -> Option<[[f32; 16]; LEAF_TRIANGLES]> {
+    ) -> Option<([[f32; 16]; LEAF_TRIANGLES], [u32; LEAF_TRIANGLES])> {
         dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
-            || self.point_gaps_by(simd, (positions, balls), bounds, most),
+            || self.point_gaps_by(simd, points, bounds, most),
         ))
     }
 
@@ -417,10 +417,10 @@ impl LeafTriangles<'_> {
     fn point_gaps_by<S: Simd>(
         &self,
         simd: S,
-        (positions, balls): (&[[f32; 16]; 3], &[f32; 16]),
+        (positions, balls, used): Reaching<'_>,
         bounds: &OrientedBox,
         most: f32,
-    ) -> Option<[[f32; 16]; LEAF_TRIANGLES]> {
+    ) -> Option<([[f32; 16]; LEAF_TRIANGLES], [u32; LEAF_TRIANGLES])> {
         let (corners, slack) = (self.corners(simd), self.relative.slack());
         let beyond = gaps_to_box(simd, &corners, bounds).simd_gt(f32x4::splat(simd, most + 3.0 * slack));
         let beyond = beyond.to_bitmask();
@@ -429,13 +429,16 @@ impl LeafTriangles<'_> {
         }
         let prepared = Prepared::new(simd, corners, slack);
         let (positions, balls) = (load(simd, positions), f32x16::load_array_ref(simd, balls));
-        let mut gaps = [[f32::INFINITY; 16]; LEAF_TRIANGLES];
+        let (mut all, mut near) = ([[f32::INFINITY; 16]; LEAF_TRIANGLES], [0; LEAF_TRIANGLES]);
         for lane in 0..LEAF_TRIANGLES {
             if beyond >> lane & 1 == 0 {
-                gaps[lane] = (prepared.get(lane).distances(simd, &positions) - balls).to_array();
+                let gaps = prepared.get(lane).distances(simd, &positions) - balls;
+                // Not `<=`, which would be false for NaN.
+                let beyond: mask32x16<S> = gaps.simd_gt(most);
+                (all[lane], near[lane]) = (gaps.to_array(), used & !bits(beyond));
             }
         }
-        Some(gaps)
+        Some((all, near))
     }
 }
 

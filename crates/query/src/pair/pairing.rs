@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 use nearmiss_geometry::Pose;
-use nearmiss_hierarchy::{NodePair, Part};
+use nearmiss_hierarchy::{NodePair, Part, Relative, Tree};
 
 use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
@@ -29,25 +29,16 @@ pub(crate) trait Pairing {
     /// The part of each scan that the enclosures contain.
     fn part(&self) -> Part;
 
-    /// The rounding error of a gap.
-    fn slack(&self) -> f32;
+    /// The relative pose in single precision.
+    fn relative(&self) -> &Relative;
 
-    /// The length in the world of one unit of a's stored frame.
-    fn to_world(&self) -> f64;
+    /// The poses of both stored frames in the world.
+    fn placed(&self) -> [&Pose; 2];
 
-    /// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
-    fn relative_pose(&self, pose: &Pose) -> RelativePose;
-
-    /// Both trees, for a descent by distance.
-    fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
+    /// Both trees.
+    fn both<'t>(&self) -> [&'t Tree<'t>; 2]
     where
         Self: 't;
-
-    /// Returns which of the two nodes are leaves.
-    fn which_are_leaves(&self, pair: NodePair) -> [bool; 2];
-
-    /// Returns `true` if both nodes exist and are leaves.
-    fn are_leaves(&self, pair: NodePair) -> bool;
 
     /// The band at the nearest points of two nodes, in the world.
     fn band_of(&self, nodes: NodePair) -> f64;
@@ -80,4 +71,42 @@ pub(crate) trait Pairing {
 
     /// Counts two leaves, given by leaf numbers, whose items are compared next.
     fn count_leaves(&mut self, leaves: [usize; 2]);
+
+    /// The rounding error of a gap.
+    #[inline(always)]
+    fn slack(&self) -> f32 {
+        self.relative().slack()
+    }
+
+    /// The length in the world of one unit of a's stored frame.
+    fn to_world(&self) -> f64 {
+        self.placed()[0].scale()
+    }
+
+    /// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
+    fn relative_pose(&self, pose: &Pose) -> RelativePose {
+        RelativePose::new(self.both().map(Tree::root_box), self.placed(), pose)
+    }
+
+    /// Both trees, for a descent by distance.
+    #[inline(always)]
+    fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
+    where
+        Self: 't,
+    {
+        Bounds { trees: self.both(), relative_pose, part: self.part() }
+    }
+
+    /// Returns which of the two nodes are leaves.
+    #[inline(always)]
+    fn which_are_leaves(&self, pair: NodePair) -> [bool; 2] {
+        let [a, b] = self.both().map(Tree::topology);
+        [a.is_leaf(pair.a), b.is_leaf(pair.b)]
+    }
+
+    /// Returns `true` if both nodes exist and are leaves.
+    fn are_leaves(&self, pair: NodePair) -> bool {
+        let [a, b] = self.both().map(Tree::topology);
+        a.has(pair.a) && b.has(pair.b) && self.which_are_leaves(pair) == [true; 2]
+    }
 }

@@ -6,7 +6,6 @@ use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, ScanArrays};
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Metric};
 
-use crate::pair::placed_balls::is_proper;
 use crate::pair::shape_index::ShapeIndex;
 
 /// Reusable memory for evaluations of f; never influences a result.
@@ -101,12 +100,6 @@ impl<'a> Placed<'a> {
     #[must_use]
     pub fn stored_to_world(&self) -> &Pose {
         &self.stored_to_world
-    }
-
-    /// Returns `true` if the pose is finite and its linear part is a rotation with a positive
-    /// scale. Products of many poses may drift away from that.
-    pub(crate) fn is_proper(&self) -> bool {
-        is_proper(&self.stored_to_world)
     }
 
     /// Returns `true` if `x` belongs to the obstacle. `x` is a world point of the implicit surface

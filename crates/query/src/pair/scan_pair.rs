@@ -1,15 +1,13 @@
 //! Two scans under a relative pose, and the operations on node pairs that all searches share.
 
 use fearless_simd::Level;
-use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{NodePair, Part, Relative, ScanArrays, TreePair};
 
 use crate::ask::options::{CollidePlan, Semantics};
-use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
 use crate::pair::placed::Placed;
 use crate::pair::placed_balls::PlacedBalls;
-use crate::pair::relative_pose::RelativePose;
 
 /// Two placed scans, their arrays, the relative pose, and the cost of the search.
 #[derive(Debug)]
@@ -37,21 +35,6 @@ impl<'a> ScanPair<'a> {
         Self { views, a, b, relative, meter, part, level }
     }
 
-    /// Returns `true` if both nodes exist and are leaves.
-    pub(crate) fn are_leaves(&self, pair: NodePair) -> bool {
-        let is_leaf = |scan: &ScanArrays<'_>, id: NodeId| {
-            let topology = scan.tree.topology();
-            topology.has(id) && topology.is_leaf(id)
-        };
-        is_leaf(self.a, pair.a) && is_leaf(self.b, pair.b)
-    }
-
-    /// Returns which of the two nodes are leaves.
-    #[inline]
-    pub(crate) fn which_are_leaves(&self, pair: NodePair) -> [bool; 2] {
-        [self.a.tree.topology().is_leaf(pair.a), self.b.tree.topology().is_leaf(pair.b)]
-    }
-
     /// The leaves that contain point `i` of a and point `j` of b.
     pub(crate) fn leaves_of(&self, [i, j]: [usize; 2]) -> NodePair {
         NodePair { a: self.a.tree.topology().leaf_of(i), b: self.b.tree.topology().leaf_of(j) }
@@ -75,19 +58,6 @@ impl<'a> ScanPair<'a> {
         'a: 't,
     {
         TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach }
-    }
-
-    /// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
-    pub(crate) fn relative_pose(&self, pose: &Pose) -> RelativePose {
-        relative_pose_of(self.views, pose)
-    }
-
-    /// The trees of both scans, for a descent by distance.
-    pub(crate) fn bounds<'t>(&self, relative_pose: &'t RelativePose) -> Bounds<'t>
-    where
-        'a: 't,
-    {
-        Bounds { trees: [&self.a.tree, &self.b.tree], relative_pose, part: self.part }
     }
 
     /// The band at two points, in the world: the greater of their local radii.
@@ -126,11 +96,6 @@ impl<'a> ScanPair<'a> {
         let (a, b) = (self.a.tree.enclosure(self.part, pair.a), self.b.tree.enclosure(self.part, pair.b));
         self.relative.gap(&a, &b)
     }
-}
-
-/// Prepares `pose`, b's pose in a's stored frame, for bounds of distances.
-pub(crate) fn relative_pose_of(views: [&Placed<'_>; 2], pose: &Pose) -> RelativePose {
-    RelativePose::new(views.map(|view| view.scan().root_box()), views.map(Placed::stored_to_world), pose)
 }
 
 /// From this many radii on, the distance of the bounding balls is a good bound, and single

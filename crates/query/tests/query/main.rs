@@ -15,6 +15,7 @@ mod interpolation_leaves;
 mod manifold;
 mod margin;
 mod mesh_scans;
+mod mesh_worlds;
 mod meshes;
 mod orders;
 mod outputs;

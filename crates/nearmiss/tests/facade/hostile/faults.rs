@@ -7,9 +7,9 @@ use nearmiss::store::{ContainerFault, File, WriteError, WriteStep};
 use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud, Scan};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-use crate::hostile::damage::restate_length;
+use crate::hostile::cases::cut_anywhere;
 use crate::hostile::exercise::exercise;
-use crate::hostile::repair::{HEADER, ROW, repair};
+use crate::hostile::repair::repair;
 
 fn scan(seed: u64) -> Scan {
     let points = arbitrary::cloud(CloudKind::Sphere, 120, seed);
@@ -29,31 +29,7 @@ fn refusals(bytes: &[u8]) -> [LoadError; 2] {
 
 #[test]
 fn a_scan_cut_anywhere_is_refused_even_if_its_header_owns_up() {
-    let whole = bytes_of(&scan(1));
-    let sections = File::from_bytes(whole.clone(), Check::Full).unwrap().sections().to_vec();
-    let ends = sections.iter().flat_map(|s| [s.offset, s.offset + s.length]);
-    let boundaries = ends.map(|end| usize::try_from(end).unwrap()).chain([0, 1, 63, 64, HEADER + ROW]);
-    let mut cuts = 0;
-    for end in boundaries.chain((0..whole.len()).step_by(61)).filter(|&end| end < whole.len()) {
-        let mut cut = whole[..end].to_vec();
-        for refused in refusals(&cut) {
-            let LoadError::Open(refused) = refused else { panic!("cut after {end}: {refused}") };
-            let told = match refused.fault {
-                ContainerFault::Empty => end == 0,
-                ContainerFault::Truncated { found, .. } => found == end as u64,
-                _ => false,
-            };
-            assert!(told, "cut after {end}: {refused}");
-        }
-        // Padding may follow the last section. If only padding is missing, this restores it.
-        restate_length(&mut cut);
-        repair(&mut cut);
-        if cut.len() < whole.len() {
-            refusals(&cut);
-        }
-        cuts += 1;
-    }
-    assert!(cuts > 90, "{cuts} cuts");
+    cut_anywhere(&bytes_of(&scan(1)), refusals);
 }
 
 #[test]

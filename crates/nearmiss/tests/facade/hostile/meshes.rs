@@ -1,23 +1,14 @@
-//! Damaged files of prepared meshes. `NEARMISS_MUTATIONS` sets the number of each kind,
-//! `NEARMISS_SEED` the first seed.
-
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::{Duration, Instant};
+//! Damaged files of prepared meshes.
 
 use nearmiss::store::{ContainerFault, File, Writer};
 use nearmiss::{Check, LoadError, Mesh, MeshBuildOptions, TriangleMesh};
 use nearmiss_testdata::arbitrary::{point_in, rng};
 use rand::RngExt;
 
-use crate::hostile::damage::{Random, damage, restate_length};
+use crate::hostile::cases::{self, cut_anywhere, repaired};
+use crate::hostile::damage::{Random, damage};
 use crate::hostile::exercise_mesh::{MeshAnswers, exercise_mesh};
-use crate::hostile::repair::{HEADER, ROW, repair};
-
-/// Time limit for a single file, on any machine that runs the tests.
-const LONGEST: Duration = Duration::from_secs(20);
-
-/// Every error message contains one of these.
-const REMEDIES: [&str; 4] = ["prepare", "copy it again", "update the program", "name another file"];
+use crate::hostile::repair::repair;
 
 /// A sphere of triangles: `rings` rings of `2 rings` vertices, and two poles.
 fn sphere(rings: u32) -> TriangleMesh {
@@ -77,6 +68,18 @@ impl Sample {
     }
 }
 
+impl cases::Sample for Sample {
+    type Answers = MeshAnswers;
+
+    fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    fn ask(&self, bytes: Vec<u8>, check: Check) -> Result<MeshAnswers, LoadError> {
+        Mesh::from_bytes(bytes, check).map(|mesh| exercise_mesh(&mesh, &self.mesh))
+    }
+}
+
 fn bytes_of(mesh: &Mesh) -> Vec<u8> {
     let mut bytes = Vec::new();
     mesh.write_to(&mut bytes).unwrap();
@@ -86,10 +89,6 @@ fn bytes_of(mesh: &Mesh) -> Vec<u8> {
 fn samples() -> Vec<Sample> {
     let one = TriangleMesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]).unwrap();
     [sphere(5), soup(61, 1.0, 3), soup(40, 1e9, 4), soup(6, 1e-7, 5), one].iter().map(Sample::of).collect()
-}
-
-fn setting(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
 }
 
 /// Outcomes of the damaged files.
@@ -102,44 +101,19 @@ struct Tally {
     alike: u32,
     /// Opened, with answers about another shape.
     other: u32,
-    longest: Duration,
 }
 
 /// Opens files damaged by `spoil`, and runs all queries on those that open.
 fn run(seed: u64, check: Check, spoil: impl Fn(&mut Vec<u8>, &mut Random)) -> Tally {
-    let samples = samples();
     let mut tally = Tally::default();
-    for case in 0..setting("NEARMISS_MUTATIONS", 1500) {
-        let mut random = Random(seed + (setting("NEARMISS_SEED", 1) << 32) + 1000 * case);
-        let sample = &samples[random.below(samples.len())];
-        let mut bytes = sample.bytes.clone();
-        spoil(&mut bytes, &mut random);
-        let start = now();
-        let outcome = catch_unwind(AssertUnwindSafe(|| match Mesh::from_bytes(bytes, check) {
-            Ok(mesh) => Some(exercise_mesh(&mesh, &sample.mesh)),
-            Err(error) => {
-                let message = error.to_string();
-                let remedy = REMEDIES.iter().any(|words| message.contains(words));
-                assert!(remedy, "what would mend it? {message}");
-                None
-            }
-        }));
-        tally.longest = tally.longest.max(start.elapsed());
-        match outcome.unwrap_or_else(|_| panic!("case {case} of seed {seed}")) {
-            None => tally.refused += 1,
-            Some(answers) if answers == sample.answers => tally.same += 1,
-            Some(answers) if answers.of_shape() == sample.answers.of_shape() => tally.alike += 1,
-            Some(_) => tally.other += 1,
-        }
-    }
-    assert!(tally.longest < LONGEST, "a file that takes {:?}", tally.longest);
+    cases::run(&samples(), seed, check, spoil, |sample, answers| match answers {
+        None => tally.refused += 1,
+        Some(answers) if answers == sample.answers => tally.same += 1,
+        Some(answers) if answers.of_shape() == sample.answers.of_shape() => tally.alike += 1,
+        Some(_) => tally.other += 1,
+    });
     println!("{check:?}: {tally:?}");
     tally
-}
-
-#[expect(clippy::disallowed_methods, reason = "a test may read the clock")]
-fn now() -> Instant {
-    Instant::now()
 }
 
 #[test]
@@ -147,14 +121,6 @@ fn damage_to_a_mesh_is_refused_or_does_no_harm() {
     let tally = run(11, Check::Full, damage);
     assert_eq!((tally.other, tally.alike), (0, 0), "an answer that differs from the sound file's");
     assert!(tally.refused > 0 && tally.same > 0, "{tally:?}: most damage shows, some undoes itself");
-}
-
-fn repaired(bytes: &mut Vec<u8>, random: &mut Random) {
-    damage(bytes, random);
-    if random.below(2) == 0 {
-        restate_length(bytes);
-    }
-    repair(bytes);
 }
 
 #[test]
@@ -299,34 +265,9 @@ fn lengths_that_contradict_each_other_are_refused() {
 
 #[test]
 fn a_mesh_cut_anywhere_is_refused_even_if_its_header_owns_up() {
-    let whole = Sample::of(&sphere(5)).bytes;
-    let refusals = |bytes: &[u8]| {
+    cut_anywhere(&Sample::of(&sphere(5)).bytes, |bytes| {
         [Check::Full, Check::Structure].map(|check| Mesh::from_bytes(bytes.to_vec(), check).unwrap_err())
-    };
-    let sections = File::from_bytes(whole.clone(), Check::Full).unwrap().sections().to_vec();
-    let ends = sections.iter().flat_map(|s| [s.offset, s.offset + s.length]);
-    let boundaries = ends.map(|end| usize::try_from(end).unwrap()).chain([0, 1, 63, 64, HEADER + ROW]);
-    let mut cuts = 0;
-    for end in boundaries.chain((0..whole.len()).step_by(61)).filter(|&end| end < whole.len()) {
-        let mut cut = whole[..end].to_vec();
-        for refused in refusals(&cut) {
-            let LoadError::Open(refused) = refused else { panic!("cut after {end}: {refused}") };
-            let told = match refused.fault {
-                ContainerFault::Empty => end == 0,
-                ContainerFault::Truncated { found, .. } => found == end as u64,
-                _ => false,
-            };
-            assert!(told, "cut after {end}: {refused}");
-        }
-        // Padding may follow the last section. If only padding is missing, this restores it.
-        restate_length(&mut cut);
-        repair(&mut cut);
-        if cut.len() < whole.len() {
-            refusals(&cut);
-        }
-        cuts += 1;
-    }
-    assert!(cuts > 90, "{cuts} cuts");
+    });
 }
 
 #[test]

@@ -1,24 +1,13 @@
-//! Thousands of damaged files. `NEARMISS_MUTATIONS` sets the number of each kind, `NEARMISS_SEED`
-//! the first seed.
-
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::{Duration, Instant};
+//! Thousands of damaged files.
 
 use nearmiss::{
-    Bandwidth, BuildOptions, Check, GraphOptions, Paths, PointCloud, Scan, SurfaceOptions, Verdict,
+    Bandwidth, BuildOptions, Check, GraphOptions, LoadError, Paths, PointCloud, Scan, SurfaceOptions, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-use crate::hostile::damage::{Random, damage, restate_length};
+use crate::hostile::cases::{self, repaired};
+use crate::hostile::damage::{Random, damage};
 use crate::hostile::exercise::{Answers, exercise};
-use crate::hostile::repair::repair;
-
-/// Time limit for a single file, on any machine that runs the tests.
-const LONGEST: Duration = Duration::from_secs(20);
-
-/// Every error message contains one of these.
-const REMEDIES: [&str; 5] =
-    ["prepare", "copy it again", "update the program", "name another file", "unpack it"];
 
 /// A valid scan, its file, and its answers.
 struct Sample {
@@ -33,6 +22,18 @@ impl Sample {
         scan.write_to(&mut bytes).unwrap();
         let answers = exercise(&scan, &scan);
         Self { scan, bytes, answers }
+    }
+}
+
+impl cases::Sample for Sample {
+    type Answers = Answers;
+
+    fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    fn ask(&self, bytes: Vec<u8>, check: Check) -> Result<Answers, LoadError> {
+        Scan::from_bytes(bytes, check).map(|scan| exercise(&scan, &self.scan))
     }
 }
 
@@ -64,10 +65,6 @@ fn samples() -> Vec<Sample> {
     bare.chain(graphs.into_iter().map(joined)).collect()
 }
 
-fn setting(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
-}
-
 /// Outcomes of the damaged files.
 #[derive(Debug, Default)]
 struct Tally {
@@ -78,47 +75,22 @@ struct Tally {
     other: u32,
     /// Changed answers that are undecided.
     undecided: u32,
-    longest: Duration,
 }
 
 /// Opens files damaged by `spoil`, and runs all queries on those that open.
 fn run(seed: u64, check: Check, spoil: impl Fn(&mut Vec<u8>, &mut Random)) -> Tally {
-    let samples = samples();
     let mut tally = Tally::default();
-    for case in 0..setting("NEARMISS_MUTATIONS", 1500) {
-        let mut random = Random(seed + (setting("NEARMISS_SEED", 1) << 32) + 1000 * case);
-        let sample = &samples[random.below(samples.len())];
-        let mut bytes = sample.bytes.clone();
-        spoil(&mut bytes, &mut random);
-        let start = now();
-        let outcome = catch_unwind(AssertUnwindSafe(|| match Scan::from_bytes(bytes, check) {
-            Ok(scan) => Some(exercise(&scan, &sample.scan)),
-            Err(error) => {
-                let message = error.to_string();
-                let remedy = REMEDIES.iter().any(|words| message.contains(words));
-                assert!(remedy, "what would mend it? {message}");
-                None
-            }
-        }));
-        tally.longest = tally.longest.max(start.elapsed());
-        match outcome.unwrap_or_else(|_| panic!("case {case} of seed {seed}")) {
-            None => tally.refused += 1,
-            Some(answers) if answers == sample.answers => tally.same += 1,
-            Some(answers) => {
-                tally.other += 1;
-                let undecided = answers.collide.iter().filter(|a| matches!(a.verdict, Verdict::Undecided(_)));
-                tally.undecided += u32::from(undecided.count() > 0);
-            }
+    cases::run(&samples(), seed, check, spoil, |sample, answers| match answers {
+        None => tally.refused += 1,
+        Some(answers) if answers == sample.answers => tally.same += 1,
+        Some(answers) => {
+            tally.other += 1;
+            let undecided = answers.collide.iter().filter(|a| matches!(a.verdict, Verdict::Undecided(_)));
+            tally.undecided += u32::from(undecided.count() > 0);
         }
-    }
-    assert!(tally.longest < LONGEST, "a file that takes {:?}", tally.longest);
+    });
     println!("{check:?}: {tally:?}");
     tally
-}
-
-#[expect(clippy::disallowed_methods, reason = "a test may read the clock")]
-fn now() -> Instant {
-    Instant::now()
 }
 
 #[test]
@@ -126,14 +98,6 @@ fn damage_is_refused_or_does_no_harm() {
     let tally = run(1, Check::Full, damage);
     assert_eq!(tally.other, 0, "an answer that differs from the sound file's");
     assert!(tally.refused > 0 && tally.same > 0, "{tally:?}: most damage shows, some undoes itself");
-}
-
-fn repaired(bytes: &mut Vec<u8>, random: &mut Random) {
-    damage(bytes, random);
-    if random.below(2) == 0 {
-        restate_length(bytes);
-    }
-    repair(bytes);
 }
 
 #[test]
