@@ -30,6 +30,7 @@ pub use many::batch::{BatchScratch, Until, each};
 pub use many::world::{Bodies, BodyId, World};
 pub use mesh::answer::{ContactRegion, MeshAnswer, MeshContact, MeshVerdict};
 pub use mesh::distance::MeshDistance;
+pub use mesh::itself::MeshItself;
 pub use mesh::pair::{MeshHint, MeshPair, MeshScratch};
 pub use mesh::placed::PlacedMesh;
 pub use mesh::quality::MeshQuality;

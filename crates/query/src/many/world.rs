@@ -160,6 +160,16 @@ impl<S: Prepared> World<S> {
         scan.map(|scan| self.place(id, Body::new(scan, pose))).is_some()
     }
 
+    /// Changes the scan of a body, as a deforming one does in every frame, and returns the result of
+    /// `change`; `None` if no body has this id. O(log n) besides.
+    pub fn change<R>(&mut self, id: BodyId, change: impl FnOnce(&mut S) -> R) -> Option<R> {
+        let pose = self.bodies.get(&id)?.pose;
+        let mut scan = self.remove(id)?;
+        let changed = change(&mut scan);
+        self.place(id, Body::new(scan, &pose));
+        Some(changed)
+    }
+
     fn place(&mut self, id: BodyId, body: Body<S>) {
         match body.bounds {
             Some(bounds) => self.tree.insert(Leaf::new(id, &bounds)),

@@ -48,6 +48,11 @@ impl MeshScratch {
             table: None,
         }
     }
+
+    /// The instructions to use, and an empty stack.
+    pub(crate) fn stack(&mut self) -> (Level, &mut Stack) {
+        (self.level, &mut self.stack)
+    }
 }
 
 /// The triangles that met, or were nearest, in the last query of a pair of meshes. The next query
@@ -177,7 +182,7 @@ impl<'a> MeshPair<'a> {
 }
 
 /// The answer for an invalid pose.
-const INVALID: MeshAnswer = MeshAnswer { verdict: MeshVerdict::Pose, likelihood: 0.5, statistics: NOTHING };
+pub(crate) const INVALID: MeshAnswer = MeshAnswer { verdict: MeshVerdict::Pose, likelihood: 0.5, statistics: NOTHING };
 
 /// The distance for an invalid pose.
 const UNKNOWN: MeshDistance = MeshDistance {
