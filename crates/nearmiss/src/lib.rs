@@ -16,6 +16,11 @@ struct FrontPage;
 #[doc = include_str!("../../../docs/guide/in-rust.md")]
 struct Guide;
 
+/// The example of the guide about moving scans compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/moving.md")]
+struct MovingGuide;
+
 #[cfg(feature = "filter")]
 pub use nearmiss_filter as filter;
 pub use nearmiss_geometry as geometry;

@@ -110,8 +110,8 @@ impl DeformingScan {
     /// were last fitted: normals turn with it, radii stretch with it, classes stay. Where lengths
     /// changed by more than a quarter, or the motion is not affine, the points of the leaf are fitted
     /// anew. Boxes, enclosures and leaf records are computed from the result. Neighbour lists are
-    /// dropped, so that evaluations of f descend instead. The reach, the sampling radius and the
-    /// order of the points stay, and sphere coverings are infinite until [`Self::renew`].
+    /// dropped, so that evaluations of f descend instead. The reach and the order of the
+    /// points stay, and sphere coverings are infinite until [`Self::renew`].
     ///
     /// # Errors
     /// If the number of points differs from that of the first frame, a coordinate is not finite or
@@ -223,7 +223,9 @@ impl DeformingScan {
             let distance = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
             return Err(DeformError::Apart { index, twin, distance });
         }
-        Ok((frame, bounds))
+        // Those of the positions as they are stored. Rounding is monotonic.
+        let stored = |p: [f64; 3]| frame.to_world(frame.to_local(p));
+        Ok((frame, Aabb { min: stored(bounds.min), max: stored(bounds.max) }))
     }
 }
 

@@ -6,6 +6,7 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{change_each, fill};
 use nearmiss_lanes::vector::dot;
 use nearmiss_store::Array;
+use nearmiss_surface::SurfacePlan;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
@@ -20,6 +21,7 @@ use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::fill_groups;
 use crate::point::spacing::{Look, spacings_of};
 use crate::scan::build::PointHierarchy;
+use crate::scan::sampling::quantile;
 use crate::tree::split::{Item, bound_in_order};
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Root, growths_of_siblings, siblings};
@@ -69,6 +71,7 @@ pub(crate) struct Memory {
     growths: Vec<[Growth; 2]>,
     /// The leaves to fit anew.
     changed: Vec<u32>,
+    counts: Vec<usize>,
 }
 
 impl Memory {
@@ -86,6 +89,7 @@ impl Memory {
             boxes: vec![OrientedBox::default(); topology.len()],
             growths: vec![[Growth::default(); 2]; topology.len()],
             changed: Vec::with_capacity(topology.leaves()),
+            counts: Vec::new(),
         };
         let Self { positions, normals, leaves, .. } = &mut memory;
         fill(leaves, |leaf| {
@@ -116,7 +120,7 @@ pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &Nex
     memory.changed.extend((0..topology.leaves()).filter(is_changed).map(id32));
     let changed = std::mem::take(&mut memory.changed);
     let spaced = if changed.is_empty() { None } else { Some(space(scan, memory, &changed)) };
-    support(scan);
+    support(scan, memory);
     bound_in_order(&memory.items, &topology, &mut memory.boxes);
     bound(scan, memory);
     if let Some(looks) = spaced {
@@ -212,9 +216,13 @@ fn space(
     move |i| blocks.binary_search(&id32(i / WIDTH)).map_or(Look::Area, |k| found[k * WIDTH + i % WIDTH].0.look())
 }
 
-/// Sets the support radii of the points, and the balls around blocks. There are no neighbour lists
-/// afterwards.
-fn support(scan: &mut PointHierarchy) {
+/// Sets the sampling radius, the support radii of the points, and the balls around blocks. There are
+/// no neighbour lists afterwards.
+fn support(scan: &mut PointHierarchy, memory: &mut Memory) {
+    scan.meta.sampling_radius = quantile(&scan.arrays.radii, &mut memory.counts);
+    let (radius, unit) = (f64::from(scan.meta.sampling_radius), 1.0 / scan.meta.frame.scale);
+    // The options were valid for the first frame.
+    scan.plan = SurfacePlan::new(&scan.meta.surface, radius, unit).unwrap_or(scan.plan);
     let (plan, radii): (_, &[f32]) = (&scan.plan, &scan.arrays.radii);
     let blocks = scan.arrays.blocks.to_mut();
     change_each(blocks, WIDTH, |number, block| {
