@@ -141,7 +141,8 @@ fn animate(
         let query_micros = micros_since(start);
         summary.add(found, update_micros, query_micros);
         if args.json {
-            let (verdict, evidence) = (found.map(|found| found.verdict), found.and_then(|found| found.evidence));
+            let (verdict, evidence) =
+                (found.map(|found| found.verdict), found.and_then(|found| found.evidence));
             let report = AnimateReport {
                 t,
                 bv_updates: updates,

@@ -37,24 +37,25 @@ pub use nearmiss_slices as slices;
 pub use nearmiss_store as store;
 pub use nearmiss_surface as surface;
 
+pub use moving_mesh::{MovingMesh, Renewal};
+pub use moving_scan::MovingScan;
 pub use nearmiss_geometry::{Aabb, CloudError, Intake, PointCloud, PointId, Pose, PoseError, TriangleMesh};
 pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{
-    BuildError, BuildOptions, DeformError, DeformingMesh, DeformingScan, GatheredPoints, IntakeError, MeshBuildError, MeshBuildOptions, MeshHierarchy,
-    PointGatherer, PointHierarchy, PointKind, Refitted, ScanPoints,
+    BuildError, BuildOptions, DeformError, DeformingMesh, DeformingScan, GatheredPoints, IntakeError,
+    MeshBuildError, MeshBuildOptions, MeshHierarchy, PointGatherer, PointHierarchy, PointKind, Refitted,
+    ScanPoints,
 };
 pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan,
     Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve, CurveEnd,
     CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence,
-    Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself, MeshPair, MeshQuality,
-    MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method, NearestPoint, Order, Pacer, Pair, PairHint,
-    Placed, PlacedMesh, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch,
-    Semantics, Shape, ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
+    Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself, MeshPair,
+    MeshQuality, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method, NearestPoint, Order, Pacer,
+    Pair, PairHint, Placed, PlacedMesh, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling,
+    Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};
-pub use moving_mesh::{MovingMesh, Renewal};
-pub use moving_scan::MovingScan;
 pub use prepared_mesh::Mesh;
 pub use scan::{Density, LoadError, SaveError, Scan};

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 
 use nearmiss_geometry::Pose;
-use nearmiss_hierarchy::{BuildOptions, DeformError, DeformingScan};
+use nearmiss_hierarchy::{BuildOptions, DeformError, DeformingScan, PointHierarchy, Refitted};
 use nearmiss_query::{Placed, Prepared};
 
 use crate::moving_mesh::Renewal;
@@ -84,23 +84,20 @@ impl MovingScan {
     /// Moves the points, given in the order of the first frame, at the least cost that keeps queries
     /// fast: by a [refit](DeformingScan::refit); if that fitted more than half of the points anew, by
     /// a [renewal](DeformingScan::renew); and if boxes have become loose, or points that no longer
-    /// sample a surface are among those that do, by preparing the scan anew.
+    /// sample a surface are among those that do, by preparing the scan anew. A frame that cannot be
+    /// prepared, such as one with all points in one place, stays refitted.
     ///
     /// # Errors
-    /// As these. The scan is at the new frame or unchanged, as [`Self::bounds`] tells.
-    ///
-    /// [`Self::bounds`]: nearmiss_hierarchy::PointHierarchy::bounds
+    /// As [`DeformingScan::refit`]. The scan is unchanged then.
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     pub fn move_to(&mut self, points: &[[f64; 3]]) -> Result<Renewal, DeformError> {
         let fitted = self.scan.refit(points)?.fitted;
         let mut done = Renewal::Refitted;
         if fitted as f64 > MOST_FITTED * self.scan.len() as f64 {
-            self.scan.renew(points)?;
-            done = Renewal::Renewed;
+            done = self.scan.renew(points).map_or(done, |()| Renewal::Renewed);
         }
         if self.scan.looseness() > LOOSE || self.scan.misplaced() > MISPLACED {
-            self.scan.rebuild(points)?;
-            done = Renewal::Rebuilt;
+            done = self.scan.rebuild(points).map_or(done, |()| Renewal::Rebuilt);
         }
         Ok(done)
     }
@@ -109,7 +106,7 @@ impl MovingScan {
     ///
     /// # Errors
     /// As [`DeformingScan::refit`].
-    pub fn refit(&mut self, points: &[[f64; 3]]) -> Result<nearmiss_hierarchy::Refitted, DeformError> {
+    pub fn refit(&mut self, points: &[[f64; 3]]) -> Result<Refitted, DeformError> {
         self.scan.refit(points)
     }
 
@@ -135,6 +132,13 @@ impl MovingScan {
     /// As [`DeformingScan::replace`].
     pub fn replace(&mut self, points: &[[f64; 3]]) -> Result<(), DeformError> {
         self.scan.replace(points)
+    }
+
+    /// Returns the current frame as a still scan, for example to save it. Later frames do not change
+    /// it.
+    #[must_use]
+    pub fn still(&self) -> Scan {
+        Scan::of(PointHierarchy::clone(&self.scan), None)
     }
 
     /// Places the scan at `pose`, which maps the frame of its points to the world.

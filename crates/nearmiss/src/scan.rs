@@ -73,7 +73,7 @@ impl Scan {
     /// The kind of the container of a scan, as [`File::kind`] returns it.
     pub const KIND: [u8; 4] = *b"SCAN";
 
-    fn of(hierarchy: PointHierarchy, graph: Option<Arc<SurfaceGraph>>) -> Self {
+    pub(crate) fn of(hierarchy: PointHierarchy, graph: Option<Arc<SurfaceGraph>>) -> Self {
         Self { hierarchy: Arc::new(hierarchy), graph, shapes: None, density: None }
     }
 

@@ -10,8 +10,9 @@ use std::path::PathBuf;
 
 use nearmiss::io::{Pieces, read_in_pieces};
 use nearmiss::{
-    BuildOptions, CollideOptions, CollidePlan, Evidence, MeshBuildOptions, MeshItself, MeshPair, MeshScratch,
-    MovingMesh, MovingScan, Pair, Placed, Pose, Scratch, TriangleMesh, Verdict,
+    Answer, BuildOptions, CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Evidence,
+    MeshBuildOptions, MeshItself, MeshPair, MeshScratch, MovingMesh, MovingScan, Pair, Placed, Pose, Scratch,
+    TriangleMesh, Verdict,
 };
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::sample::count;
@@ -213,47 +214,74 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
     let poses = poses(options, size);
     let mut scratch = Scratch::default();
     let asked = CollideOptions::default().with_evidence(Evidence::Certified);
-    let mut ask = |scan: &MovingScan, pose: &Pose, times: &mut Times| -> Result<(Verdict, f64), Failure> {
+    let mut ask = |scan: &MovingScan, pose: &Pose, times: &mut Times| -> Result<Answer, Failure> {
         let plan = CollidePlan::new(&asked, scan, scan)?;
         let pair = Pair::new(scan.at(&Pose::IDENTITY), Placed::new(scan, pose));
-        let answer = times.of(|| black_box(pair.collide(&plan, &mut scratch)));
-        Ok((answer.verdict, answer.band.unwrap_or_default()))
+        Ok(times.of(|| black_box(pair.collide(&plan, &mut scratch))))
     };
-    let (mut differ, mut proven, mut apart, mut fitted, mut most, mut loosest) = ([0; 2], [0; 3], 0, 0, 0, 1.0);
+    let mut totals = Totals::default();
     for frame in &frames {
         let done = refit.of(|| refitted.refit(frame))?.fitted;
-        fitted += done;
-        most = done.max(most);
-        loosest = refitted.looseness().max(loosest);
+        totals.fitted += done;
+        totals.most = done.max(totals.most);
+        totals.loosest = refitted.looseness().max(totals.loosest);
         renew.of(|| renewed.renew(frame))?;
         rebuild.of(|| anew.rebuild(frame))?;
         for pose in about(&poses, refitted.bounds().centre()) {
-            let of_refitted = ask(&refitted, &pose, ask_refitted)?;
-            let of_renewed = ask(&renewed, &pose, ask_renewed)?;
-            let (expected, _) = ask(&anew, &pose, ask_anew)?;
-            for (k, (found, _)) in [of_refitted, of_renewed].into_iter().enumerate() {
-                differ[k] += usize::from(found.is_intersecting() != expected.is_intersecting());
+            let expected = ask(&anew, &pose, ask_anew)?;
+            let asked = [(&refitted, &mut *ask_refitted), (&renewed, &mut *ask_renewed)];
+            for (k, (scan, times)) in asked.into_iter().enumerate() {
+                let found = ask(scan, &pose, times)?;
+                totals.proven[k] += usize::from(is_proof(&found.verdict));
+                if found.verdict.is_intersecting() != expected.verdict.is_intersecting() {
+                    totals.differ[k] += 1;
+                    // The one that is separated tells how far.
+                    let (apart, answer) =
+                        if expected.verdict.is_intersecting() { (scan, &found) } else { (&anew, &expected) };
+                    totals.beyond[k] += usize::from(nearest(apart, &pose)? > answer.band);
+                }
             }
-            let is_proof = |verdict: &Verdict| {
-                usize::from(matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. }))
-            };
-            for (sum, verdict) in proven.iter_mut().zip([of_refitted.0, of_renewed.0, expected]) {
-                *sum += is_proof(&verdict);
-            }
-            apart += usize::from(expected.is_separated());
+            totals.proven[2] += usize::from(is_proof(&expected.verdict));
+            totals.apart += usize::from(expected.verdict.is_separated());
         }
     }
     heading(&format!("a scan of {} points", refitted.len()));
-    let names =
-        ["refit", "renew", "prepare anew", "ask, refitted", "ask, renewed", "ask, prepared anew"];
+    let names = ["refit", "renew", "prepare anew", "ask, refitted", "ask, renewed", "ask, prepared anew"];
     times.into_iter().zip(names).for_each(|(times, name)| times.row(name));
+    let Totals { differ, beyond, proven, apart, fitted, most, loosest } = totals;
     println!(
-        "\n{differ:?} of {} verdicts of refitted and renewed scans differ from those prepared anew; of {apart} separations \
-         {proven:?} are certified by each; {:.2} % of points fitted anew in a frame, at most {:.2} %; boxes at most \
-         {loosest:.2} times as costly",
+        "\n{differ:?} of {} verdicts of refitted and renewed scans differ from those prepared anew, {beyond:?} beyond the \
+         band; of {apart} separations {proven:?} are certified by each; {:.2} % of points fitted anew in a frame, at most \
+         {:.2} %; boxes at most {loosest:.2} times as costly",
         frames.len() * poses.len(),
         100.0 * count(fitted) / count(frames.len() * refitted.len()),
         100.0 * count(most) / count(refitted.len()),
     );
     Ok(())
+}
+
+/// Counts over all frames and poses, of refitted, renewed and rebuilt scans.
+#[derive(Debug, Default)]
+struct Totals {
+    /// Verdicts that differ from those of a scan prepared anew, and those beyond the band.
+    differ: [usize; 2],
+    beyond: [usize; 2],
+    /// Certified separations.
+    proven: [usize; 3],
+    apart: usize,
+    /// Points fitted anew by refits, in all frames and at most.
+    fitted: usize,
+    most: usize,
+    loosest: f64,
+}
+
+fn is_proof(verdict: &Verdict) -> bool {
+    matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
+}
+
+/// Returns the upper bound of the distance of two copies.
+fn nearest(scan: &MovingScan, pose: &Pose) -> Result<f64, Failure> {
+    let plan = DistancePlan::new(&DistanceOptions::default(), scan, scan)?;
+    let pair = Pair::new(scan.at(&Pose::IDENTITY), Placed::new(scan, pose));
+    Ok(pair.distance(&plan, &mut Scratch::default()).upper)
 }

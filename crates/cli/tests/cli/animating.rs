@@ -66,7 +66,8 @@ fn a_denting_sheet_meets_the_floor_in_the_last_frame() {
             }
         }
     }
-    let args = [&["animate"], &SCAN[..], &["--against-frames"], &MESH[..], &["--rate", "4", "--json"]].concat();
+    let args =
+        [&["animate"], &SCAN[..], &["--against-frames"], &MESH[..], &["--rate", "4", "--json"]].concat();
     let told = place.ok(&args).json();
     assert_eq!(told.len(), 13, "four times a second for three seconds, with both ends");
     assert!(verdicts(&told).iter().all(|verdict| *verdict == "intersecting"), "two copies: {told:?}");
@@ -93,7 +94,11 @@ fn frames_that_do_not_belong_together_are_refused() {
     let mut broken = text(&sheet(4.0, 0.0));
     broken = broken.replacen("4", "nan", 1);
     place.write("broken.xyz", broken);
-    place.refused(1, &["animate", "scan-0.xyz", "short.xyz"], &["short.xyz", "expected 441 points", "scan-0.xyz", "400"]);
+    place.refused(
+        1,
+        &["animate", "scan-0.xyz", "short.xyz"],
+        &["short.xyz", "expected 441 points", "scan-0.xyz", "400"],
+    );
     place.refused(1, &["animate", "mesh-0.obj", "short.xyz"], &["short.xyz", "441 vertices", "400"]);
     place.refused(1, &["animate", "scan-0.xyz", "broken.xyz"], &["broken.xyz", "point", "NaN"]);
     place.refused(

@@ -58,7 +58,8 @@ impl Rest {
         }
         let ridge = RIDGE * (s[0] + s[3] + s[5]);
         let [a, b, c, d, e, f] = [s[0] + ridge, s[1], s[2], s[3] + ridge, s[4], s[5] + ridge];
-        let adjugate = [d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b];
+        let adjugate =
+            [d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b];
         let determinant = a * adjugate[0] + b * adjugate[1] + c * adjugate[2];
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
         let inverse = adjugate.map(|x| (x / determinant) as f32);

@@ -30,7 +30,9 @@ pub enum DeformError {
         position: [f64; 3],
     },
     /// The positions are so far away, or the extent so large, that coordinates overflow.
-    #[error("expected coordinates below {limit:e}, got {got:e}; scale the positions, or start anew from this frame")]
+    #[error(
+        "expected coordinates below {limit:e}, got {got:e}; scale the positions, or start anew from this frame"
+    )]
     TooFar {
         /// The limit.
         limit: f64,

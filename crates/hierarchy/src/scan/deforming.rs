@@ -143,7 +143,11 @@ impl DeformingScan {
         let ordered = Ordered::kept(&in_order, self.scan.meta.dense as usize, &self.options, &work)?;
         let mut scan = assembled(finish(&in_order, ordered, &self.options, &work)?, &work)?;
         if self.scan.is_oriented() {
-            refit(&mut self.scan, &mut self.memory, &NextFrame { points, frame, bounds, step: in_order.step });
+            refit(
+                &mut self.scan,
+                &mut self.memory,
+                &NextFrame { points, frame, bounds, step: in_order.step },
+            );
             scan.turn_normals(self.scan.normals());
         }
         *self = Self::with(scan, self.options, self.given, std::mem::take(&mut self.twins));
@@ -209,7 +213,8 @@ impl DeformingScan {
         // Lengths are stored in the unit of the first frame.
         let scale = self.scan.frame().scale;
         let frame = Frame { scale, ..Frame::around(bounds.min, bounds.max) };
-        let far = |k: usize| (bounds.min[k] - frame.origin[k]).abs().max((bounds.max[k] - frame.origin[k]).abs());
+        let far =
+            |k: usize| (bounds.min[k] - frame.origin[k]).abs().max((bounds.max[k] - frame.origin[k]).abs());
         let got = (0..3).map(far).fold(0.0, f64::max);
         let limit = FARTHEST * scale;
         if got > limit || !got.is_finite() {

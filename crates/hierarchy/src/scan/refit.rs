@@ -196,13 +196,8 @@ fn space(
     blocks.dedup();
     let boxes = BlockBoxes::new(&scan.arrays.blocks, scan.len());
     let options = (scan.meta.radius_neighbours as usize, scan.meta.reach);
-    let found = spacings_of(
-        scan.positions(),
-        &boxes.over(&scan.arrays.blocks),
-        options,
-        &scan.arrays.radii,
-        &blocks,
-    );
+    let found =
+        spacings_of(scan.positions(), &boxes.over(&scan.arrays.blocks), options, &scan.arrays.radii, &blocks);
     let leaf_size = topology.leaf_size();
     let radii = scan.arrays.radii.to_mut();
     for (block, found) in blocks.iter().zip(found.chunks(WIDTH)) {
@@ -213,7 +208,9 @@ fn space(
             }
         }
     }
-    move |i| blocks.binary_search(&id32(i / WIDTH)).map_or(Look::Area, |k| found[k * WIDTH + i % WIDTH].0.look())
+    move |i| {
+        blocks.binary_search(&id32(i / WIDTH)).map_or(Look::Area, |k| found[k * WIDTH + i % WIDTH].0.look())
+    }
 }
 
 /// Sets the sampling radius, the support radii of the points, and the balls around blocks. There are

@@ -54,7 +54,9 @@ impl Sampling {
         work.progress().reach(share::RADII);
         let mut counts = Vec::new();
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-        let reach = options.reach.map_or_else(|| REACH * quantile(&radii, &mut counts), |reach| (reach * unit) as f32);
+        let reach = options
+            .reach
+            .map_or_else(|| REACH * quantile(&radii, &mut counts), |reach| (reach * unit) as f32);
         if !(reach.is_normal() && reach >= f32::EPSILON * extent(positions)) {
             return Err(BuildError::Reach(f64::from(reach) / unit));
         }

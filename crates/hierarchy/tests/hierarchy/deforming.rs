@@ -74,7 +74,10 @@ fn check_enclosed(scan: &PointHierarchy, seed: u64, name: &str) -> [usize; 2] {
         let mut node = Some(scan.topology().leaf_of(p));
         while let Some(id) = node {
             let beyond = outside(&scan.tree().enclosure(part, id), x);
-            assert!(beyond <= 0.0, "{name}: {x:?} is {beyond} outside {part:?} of node {id:?}, near point {p}");
+            assert!(
+                beyond <= 0.0,
+                "{name}: {x:?} is {beyond} outside {part:?} of node {id:?}, near point {p}"
+            );
             node = scan.topology().parent(id).map(|(parent, _)| parent);
         }
     };

@@ -37,10 +37,13 @@ fn frames(vertices: &[[f64; 3]], seed: u64) -> Vec<(&'static str, Vec<[f64; 3]>)
         ("rigid", all(&|_, p| turn.apply(p))),
         ("shear", all(&|_, [x, y, z]| [x + 0.8 * z, y, z - 0.3 * x])),
         ("bend", all(&|_, [x, y, z]| [(0.15 * x).sin() * (y + 9.0), (0.15 * x).cos() * (y + 9.0), z])),
-        ("twist", all(&|_, [x, y, z]| {
-            let (s, c) = (0.3 * x).sin_cos();
-            [x, c * y - s * z, s * y + c * z]
-        })),
+        (
+            "twist",
+            all(&|_, [x, y, z]| {
+                let (s, c) = (0.3 * x).sin_cos();
+                [x, c * y - s * z, s * y + c * z]
+            }),
+        ),
         ("noise", all(&|i, p| [0, 1, 2].map(|k| p[k] + noise[i][k]))),
         ("soup", all(&|i, _| noise[i].map(|x| 20.0 * x))),
         ("far", all(&|_, p| [p[0] + 4e6, p[1], p[2] - 1e6])),
@@ -184,7 +187,10 @@ fn a_bent_dragon_answers_as_one_prepared_anew() {
         let place = Pose::from_translation([1.2 * size, 0.1 * size, 0.0]);
         let found = answers(moving.at(&Pose::IDENTITY), moving.at(&place), &mut MeshHint::default());
         let expected = answers(anew.at(&Pose::IDENTITY), anew.at(&place), &mut MeshHint::default());
-        assert!(found == expected || found.2.upper == expected.2.upper && found.1 == expected.1, "step {step}");
+        assert!(
+            found == expected || found.2.upper == expected.2.upper && found.1 == expected.1,
+            "step {step}"
+        );
     }
     assert!(loosest < 2.0, "kept axes stay useful: {loosest}");
 }

@@ -2,9 +2,9 @@
 //! earlier frames.
 
 use nearmiss::{
-    Bodies, BuildOptions, CollideOptions, CollidePlan, DeformError, DistanceOptions, DistancePlan, Evidence,
-    GraphOptions, MovingScan, Pair, PairHint, PointCloud, Pose, Proof, Renewal, Scan, Scratch, Semantics,
-    Verdict, World,
+    Bodies, BuildOptions, Check, CollideOptions, CollidePlan, DeformError, DistanceOptions, DistancePlan,
+    Evidence, GraphOptions, MovingScan, Pair, PairHint, PointCloud, Pose, Proof, Renewal, Scan, Scratch,
+    Semantics, Verdict, World,
 };
 use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
 use nearmiss_testdata::shapes::{Sampling, scorer_radius, sphere};
@@ -56,7 +56,8 @@ fn refitted_renewed_and_prepared_scans_agree_outside_the_band() {
             let pose = rotation(rng).with_translation(away);
             let truth = least(&frame, &frame, &pose);
             let mut verdicts = Vec::new();
-            for placed in [refitted.at(&Pose::IDENTITY), renewed.at(&Pose::IDENTITY), anew.at(&Pose::IDENTITY)]
+            for placed in
+                [refitted.at(&Pose::IDENTITY), renewed.at(&Pose::IDENTITY), anew.at(&Pose::IDENTITY)]
             {
                 let other = nearmiss::Placed::new(placed.scan(), &pose);
                 let plan = CollidePlan::new(&certified(), placed.scan(), placed.scan()).unwrap();
@@ -77,14 +78,16 @@ fn refitted_renewed_and_prepared_scans_agree_outside_the_band() {
                 }
                 verdicts.push(verdict.is_intersecting());
             }
-            // Points 1.5 radii apart may or may not meet.
-            if truth > 2.0 * r || truth < 0.2 * r {
+            // Moved apart by two radii, a pair that is deep within each other still meets.
+            let apart = away.map(|c| c * (1.0 + 2.0 * r / 1.6));
+            let is_deep = least(&frame, &frame, &pose.with_translation(apart)) < 0.5 * r;
+            if truth > 2.0 * r || is_deep {
                 assert!(verdicts.iter().all(|v| *v == verdicts[2]), "step {step}, {truth}: {verdicts:?}");
                 seen[usize::from(verdicts[2])] += 1;
             }
         }
     }
-    assert!(seen[0] > 40 && seen[1] > 40 && proven > 120, "{seen:?} verdicts, {proven} proven");
+    assert!(seen[0] > 40 && seen[1] > 25 && proven > 120, "{seen:?} verdicts, {proven} proven");
 }
 
 #[test]
@@ -146,6 +149,23 @@ fn every_meaning_is_answered_for_a_moving_scan() {
             }
         }
     }
+}
+
+#[test]
+fn a_frame_can_be_kept_and_passes_every_check_of_a_file() {
+    let points = ball();
+    let mut moving = MovingScan::new(&points, &BuildOptions::default()).unwrap();
+    moving.refit(&deformed(&points, 0.7)).unwrap();
+    let still = moving.still();
+    let bounds = *still.bounds();
+    moving.refit(&deformed(&points, 0.1)).unwrap();
+    assert_eq!(*still.bounds(), bounds, "a later frame does not change it");
+    let mut bytes = Vec::new();
+    still.write_to(&mut bytes).unwrap();
+    let read = Scan::from_bytes(bytes, Check::Full).unwrap();
+    assert_eq!(read.outline(), still.outline(), "the frame as it was");
+    assert!(moving.move_to(&vec![[1.0, 2.0, 3.0]; points.len()]).is_ok(), "all points in one place");
+    assert_eq!(moving.bounds().min, moving.bounds().max);
 }
 
 #[test]

@@ -182,7 +182,8 @@ impl<'a> MeshPair<'a> {
 }
 
 /// The answer for an invalid pose.
-pub(crate) const INVALID: MeshAnswer = MeshAnswer { verdict: MeshVerdict::Pose, likelihood: 0.5, statistics: NOTHING };
+pub(crate) const INVALID: MeshAnswer =
+    MeshAnswer { verdict: MeshVerdict::Pose, likelihood: 0.5, statistics: NOTHING };
 
 /// The distance for an invalid pose.
 const UNKNOWN: MeshDistance = MeshDistance {
