@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod animate;
 mod bus;
 mod clash;
 mod collide;
@@ -69,12 +70,13 @@ mod defaults;
 
 use std::ffi::OsString;
 use std::iter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+pub use animate::{AnimateArgs, AnimateMethod};
 pub use as_mesh::AsMeshName;
 pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
@@ -158,6 +160,12 @@ matrices are row-major and map an object to the world. a stays where it is; d is
 of the bounding boxes, in the units of the files. offset is the shift along the line between the centres from first \
 contact: positive apart, negative further in.";
 
+const ANIMATE_EXAMPLES: &str = "\
+Examples:
+  nearmiss animate horse-*.ply
+  nearmiss animate horse-*.ply --against wall.nm --rate 30 --json
+  nearmiss animate cloth-*.ply --against-frames ball-*.ply --method refit";
+
 const TOUCH_EXAMPLE: &str = "\
 Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} for each shape:
   nearmiss touch room.nm --shapes robot.jsonl --json";
@@ -215,6 +223,9 @@ pub enum Command {
     /// Test spheres, capsules and boxes against the points of a scan
     #[command(after_long_help = TOUCH_EXAMPLE)]
     Touch(TouchArgs),
+    /// Follow a mesh or scan that deforms from frame to frame, and test it at every query time
+    #[command(after_long_help = ANIMATE_EXAMPLES)]
+    Animate(AnimateArgs),
     /// Find how many random points an error rate needs, for `collide --method interpolation --flat`
     #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
     Density(DensityArgs),
@@ -248,6 +259,10 @@ impl Command {
             Self::Curve(args) => vec![&args.pair.a, &args.pair.b],
             Self::Distance(args) => vec![&args.pair.a, &args.pair.b],
             Self::Touch(args) => vec![&args.scan],
+            Self::Animate(args) => {
+                let all = args.frames.iter().chain(&args.against_frames).chain(&args.against);
+                all.map(PathBuf::as_path).collect()
+            }
             Self::Density(args) => vec![&args.a],
             Self::Poses(args) => vec![&args.a, &args.b],
             Self::Export(args) => vec![&args.file],
@@ -272,6 +287,7 @@ impl Command {
             Self::Density(args) => density::run(args),
             Self::Distance(args) => distance::run(args),
             Self::Touch(args) => touch::run(args),
+            Self::Animate(args) => animate::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),
             Self::Sample(args) => sample::run(args),

@@ -5,5 +5,6 @@ pub(crate) mod classes;
 pub(crate) mod covering;
 pub(crate) mod enclosure;
 pub(crate) mod extents;
+pub(crate) mod parts;
 pub(crate) mod samples;
 pub(crate) mod surfels;

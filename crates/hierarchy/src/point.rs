@@ -1,5 +1,6 @@
 //! Data of single points: spacing, kind, support, leaf records.
 
+pub(crate) mod affine;
 pub(crate) mod disc;
 pub(crate) mod gather;
 pub(crate) mod kind;

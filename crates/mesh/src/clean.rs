@@ -219,6 +219,15 @@ fn check(vertices: &[[f64; 3]], triangles: &[[u32; 3]], options: &CleanOptions) 
     if !(options.weld >= 0.0 && options.weld.is_finite()) {
         return Err(CleanError::Weld { weld: options.weld });
     }
+    validate(vertices, triangles)
+}
+
+/// Checks a mesh without cleaning it: every vertex is finite, and every triangle has vertices. O(n).
+///
+/// # Errors
+/// If a vertex has a coordinate that is NaN or infinite, if a triangle refers to a vertex that does
+/// not exist, or if there are more than 2^32 − 1 vertices or triangles.
+pub fn validate(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(), CleanError> {
     for (what, count) in [("vertices", vertices.len()), ("triangles", triangles.len())] {
         if u32::try_from(count).is_err() {
             return Err(CleanError::TooMany { what, count });

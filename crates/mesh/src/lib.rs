@@ -14,7 +14,7 @@ mod triangle;
 mod weld;
 mod wide;
 
-pub use clean::{CleanError, CleanMesh, CleanOptions, CleanReport};
+pub use clean::{CleanError, CleanMesh, CleanOptions, CleanReport, validate};
 pub use contact::{TriangleContact, triangle_contact, unit_normal};
 pub use distance::{TriangleDistance, triangle_distance};
 pub use lattice::{Lattice, lattice_samples};

@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod moving_mesh;
+mod moving_scan;
 mod prepared_mesh;
 mod scan;
 
@@ -13,6 +15,11 @@ struct FrontPage;
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/in-rust.md")]
 struct Guide;
+
+/// The example of the guide about moving scans compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/moving.md")]
+struct MovingGuide;
 
 #[cfg(feature = "filter")]
 pub use nearmiss_filter as filter;
@@ -32,21 +39,24 @@ pub use nearmiss_slices as slices;
 pub use nearmiss_store as store;
 pub use nearmiss_surface as surface;
 
+pub use moving_mesh::{MovingMesh, Renewal};
+pub use moving_scan::MovingScan;
 pub use nearmiss_geometry::{Aabb, CloudError, Intake, PointCloud, PointId, Pose, PoseError, TriangleMesh};
 pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{
-    BuildError, BuildOptions, GatheredPoints, IntakeError, MeshBuildError, MeshBuildOptions, MeshHierarchy,
-    PointGatherer, PointHierarchy, PointKind, ScanPoints,
+    BuildError, BuildOptions, DeformError, DeformingMesh, DeformingScan, GatheredPoints, IntakeError,
+    MeshBuildError, MeshBuildOptions, MeshHierarchy, PointGatherer, PointHierarchy, PointKind, Refitted,
+    ScanPoints,
 };
 pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, Body, BodyId, BodyPair, Brackets, Budget, Clash, ClashKind, ClashOptions,
     ClashPlan, Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve,
     CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
-    Evidence, Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshPair,
-    MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method, NearestPoint,
-    Order, Pacer, Pair, PairHint, Placed, PlacedBody, PlacedMesh, PlanError, Prepared, PreparedMesh, Proof,
-    Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize,
-    Until, Verdict, World, each,
+    Evidence, Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself,
+    MeshPair, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method,
+    NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedBody, PlacedMesh, PlanError, Prepared,
+    PreparedMesh, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex,
+    Statistics, SurfelSize, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

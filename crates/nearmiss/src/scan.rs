@@ -73,8 +73,13 @@ impl Scan {
     /// The kind of the container of a scan, as [`File::kind`] returns it.
     pub const KIND: [u8; 4] = *b"SCAN";
 
-    fn of(hierarchy: PointHierarchy, graph: Option<Arc<SurfaceGraph>>) -> Self {
+    pub(crate) fn of(hierarchy: PointHierarchy, graph: Option<Arc<SurfaceGraph>>) -> Self {
         Self { hierarchy: Arc::new(hierarchy), graph, shapes: None, density: None }
+    }
+
+    /// Returns the prepared points without graph, shape index and density.
+    pub(crate) fn into_hierarchy(self) -> PointHierarchy {
+        Arc::unwrap_or_clone(self.hierarchy)
     }
 
     /// Preprocesses `cloud`. Takes about 1.5 s for a million points on two cores.

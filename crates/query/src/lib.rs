@@ -32,6 +32,7 @@ pub use many::world::{Bodies, BodyId, World};
 pub use mesh::answer::{ContactRegion, MeshAnswer, MeshContact, MeshVerdict};
 pub use mesh::distance::MeshDistance;
 pub use mesh::hint::MeshHint;
+pub use mesh::itself::MeshItself;
 pub use mesh::pair::{MeshPair, MeshScratch};
 pub use mesh::placed::PlacedMesh;
 pub use mesh::prepared::PreparedMesh;

@@ -5,6 +5,7 @@ pub(crate) mod cell_table;
 pub(crate) mod collide;
 pub(crate) mod distance;
 pub(crate) mod hint;
+pub(crate) mod itself;
 pub(crate) mod mesh_pair;
 pub(crate) mod odds;
 pub(crate) mod pair;

@@ -16,6 +16,7 @@ mod hints;
 mod kinetic;
 mod mesh_scans;
 mod meshes;
+mod moving;
 mod reading;
 mod scans;
 mod shapes;
@@ -67,6 +68,8 @@ enum Command {
     Meshes(meshes::Options),
     /// An object's mesh against scans, beside its points
     MeshScans(mesh_scans::Options),
+    /// Meshes and scans that deform: refitting, renewing, preparing anew
+    Moving(moving::Options),
     /// The speed of reading point files
     Reading(reading::Options),
     /// Decided and certified shares on real scans
@@ -98,6 +101,7 @@ fn main() -> Result<(), Failure> {
         Command::Kinetic(options) => kinetic::run(&options),
         Command::Meshes(options) => meshes::run(&options),
         Command::MeshScans(options) => mesh_scans::run(&options),
+        Command::Moving(options) => moving::run(&options),
         Command::Reading(options) => reading::run(&options),
         Command::Scans(options) => scans::run(&options),
         Command::Shapes(arguments) => shapes::run(&arguments),

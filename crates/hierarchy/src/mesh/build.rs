@@ -161,7 +161,7 @@ impl MeshView<'_> {
 }
 
 /// Coordinates beyond this would overflow in products.
-const FARTHEST: f64 = 1e150;
+pub(crate) const FARTHEST: f64 = 1e150;
 
 fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarchy, MeshBuildError> {
     let clean = CleanMesh::new(mesh, &options.clean)?;
@@ -169,17 +169,69 @@ fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarch
     if clean.triangles().is_empty() {
         return Err(MeshBuildError::Empty { triangles: mesh.triangles().len() });
     }
-    let bounds = Aabb::of(clean.vertices().iter().copied());
+    let (items, mut built) = over(clean.vertices(), clean.triangles(), options.cells)?;
+    let (vertices, triangles) = in_order(&clean, &items);
+    let source: Vec<u32> = items.iter().map(|item| clean.sources()[item.index as usize]).collect();
+    let report = clean.report();
+    built.meta.given = given;
+    built.meta.dropped = DroppedTriangles {
+        degenerate: id32(report.degenerate_triangles),
+        duplicate: id32(report.duplicate_triangles),
+        welded_vertices: id32(report.welded_vertices),
+    };
+    built.arrays.vertices = vertices.into();
+    built.arrays.triangles = triangles.into();
+    built.arrays.source = source.into();
+    built.meta.identity = built.hashed();
+    Ok(built)
+}
+
+/// Prepares a valid mesh as it is: vertices keep their order, none is welded, and triangles without
+/// area or with the corners of another stay.
+pub(crate) fn build_as_given(
+    vertices: Vec<[f64; 3]>,
+    triangles: &[[u32; 3]],
+    options: &MeshBuildOptions,
+) -> Result<MeshHierarchy, MeshBuildError> {
+    if triangles.is_empty() {
+        return Err(MeshBuildError::Empty { triangles: 0 });
+    }
+    on_threads(options.threads, || {
+        let (items, mut built) = over(&vertices, triangles, options.cells)?;
+        let source: Vec<u32> = items.iter().map(|item| item.index).collect();
+        built.meta.given = id32(triangles.len());
+        built.arrays.triangles = map_all(&source, |i| triangles[*i as usize]).into();
+        built.arrays.source = source.into();
+        built.arrays.vertices = vertices.into();
+        built.meta.identity = built.hashed();
+        Ok(built)
+    })
+    .or(Err(MeshBuildError::Threads(options.threads)))?
+}
+
+/// Returns the greatest coordinate, if coordinates are so large that products overflow.
+pub(crate) fn too_far(bounds: &Aabb) -> Option<f64> {
     let far = bounds.min.iter().chain(&bounds.max).fold(0.0_f64, |far, x| far.max(x.abs()));
-    if far > FARTHEST {
+    (far > FARTHEST).then_some(far)
+}
+
+/// Orders triangles into a tree and fits its boxes. Returns the triangles in order, and the mesh
+/// without vertices, triangles and their sources.
+fn over(
+    vertices: &[[f64; 3]],
+    triangles: &[[u32; 3]],
+    counts_cells: bool,
+) -> Result<(Vec<Item>, MeshHierarchy), MeshBuildError> {
+    let bounds = Aabb::of(vertices.iter().copied());
+    if let Some(far) = too_far(&bounds) {
         return Err(MeshBuildError::TooFar(far));
     }
     let frame = Frame::around(bounds.min, bounds.max);
-    let local: Vec<[f32; 3]> = map_all(clean.vertices(), |p| frame.to_local(*p));
-    let corners_of = |i: usize| clean.triangles()[i].map(|v| local[v as usize]);
+    let local: Vec<[f32; 3]> = map_all(vertices, |p| frame.to_local(*p));
+    let corners_of = |i: usize| triangles[i].map(|v| local[v as usize]);
 
-    let topology = Topology::new(id32(clean.triangles().len()), id32(LEAF_TRIANGLES));
-    let mut items: Vec<Item> = map(clean.triangles().len(), |i| {
+    let topology = Topology::new(id32(triangles.len()), id32(LEAF_TRIANGLES));
+    let mut items: Vec<Item> = map(triangles.len(), |i| {
         let [a, b, c] = corners_of(i);
         let position = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
         Item { position, index: id32(i) }
@@ -189,14 +241,7 @@ fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarch
     split(&mut items, &topology, count, &mut boxes);
 
     let mut blocks = vec![TriangleBlock::zeroed(); topology.leaves()];
-    fill(&mut blocks, |number| {
-        let mut triangles = [[[0.0; 3]; 3]; LEAF_TRIANGLES];
-        let own = topology.points_of_leaf(number);
-        for (place, item) in triangles.iter_mut().zip(&items[own.clone()]) {
-            *place = corners_of(item.index as usize);
-        }
-        TriangleBlock::new(&triangles[..own.len()])
-    });
+    fill(&mut blocks, |number| block(&topology, number, |i| corners_of(items[i].index as usize)));
     let axes = axes_of_nodes(&topology, |i| blocks[i / LEAF_TRIANGLES].get(i % LEAF_TRIANGLES));
     for (bounds, axes) in boxes.iter_mut().zip(axes) {
         bounds.axes = axes.unwrap_or(bounds.axes);
@@ -205,28 +250,32 @@ fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarch
     let mut packed = vec![Siblings::NONE; topology.inner()];
     siblings(&topology, &boxes, &mut packed);
 
-    let cells = if options.cells { filled_cells(&topology, &boxes, &blocks) } else { Vec::new() };
-    let (vertices, triangles) = in_order(&clean, &items);
-    let source: Vec<u32> = items.iter().map(|item| clean.sources()[item.index as usize]).collect();
+    let cells = if counts_cells { filled_cells(&topology, &boxes, &blocks) } else { Vec::new() };
     let root = Root { bounds: boxes[0], ..Root::default() };
-    let report = clean.report();
-    let dropped = DroppedTriangles {
-        degenerate: id32(report.degenerate_triangles),
-        duplicate: id32(report.duplicate_triangles),
-        welded_vertices: id32(report.welded_vertices),
-    };
-    let meta = MeshMeta { frame, bounds, ball: Ball::about(&root.bounds), root, identity: 0, given, dropped };
+    let (ball, dropped) = (Ball::about(&root.bounds), DroppedTriangles::default());
+    let meta = MeshMeta { frame, bounds, ball, root, identity: 0, given: 0, dropped };
     let arrays = MeshArrays {
         siblings: packed.into(),
         blocks: blocks.into(),
-        vertices: vertices.into(),
-        triangles: triangles.into(),
-        source: source.into(),
         cells: cells.into(),
+        ..MeshArrays::default()
     };
-    let mut mesh = MeshHierarchy { meta, topology, arrays };
-    mesh.meta.identity = mesh.hashed();
-    Ok(mesh)
+    Ok((items, MeshHierarchy { meta, topology, arrays }))
+}
+
+/// Returns the block of a leaf, given the corners of each triangle in leaf order.
+pub(crate) fn block(
+    topology: &Topology,
+    number: usize,
+    corners: impl Fn(usize) -> [[f32; 3]; 3],
+) -> TriangleBlock {
+    let mut triangles = [[[0.0; 3]; 3]; LEAF_TRIANGLES];
+    let own = topology.points_of_leaf(number);
+    let count = own.len();
+    for (place, i) in triangles.iter_mut().zip(own) {
+        *place = corners(i);
+    }
+    TriangleBlock::new(&triangles[..count])
 }
 
 /// Returns the vertices in the order of their first use and the triangles in leaf order.

@@ -40,15 +40,26 @@ const AGREEING: f32 = 0.5;
 /// Corrects the classes of single points by those of their neighbours. O(n) if all points are on
 /// sheets.
 pub(crate) fn vote(tree: &BlockTree<'_>, positions: &[[f32; 3]], radii: &[f32], fits: &mut [Fit]) {
+    vote_among(tree, positions, radii, fits, |_| true);
+}
+
+/// Does the same for the points that are `open`.
+pub(crate) fn vote_among(
+    tree: &BlockTree<'_>,
+    positions: &[[f32; 3]],
+    radii: &[f32],
+    fits: &mut [Fit],
+    open: impl Fn(usize) -> bool + Sync + Send,
+) {
     let (level, before) = (Level::new(), &*fits);
     let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(positions.len());
-    let in_doubt = |block: usize| before[of_block(block)].iter().any(|fit| fit.kind() == PointKind::Noisy);
+    let in_doubt = |block: usize| of_block(block).any(|i| before[i].kind() == PointKind::Noisy && open(i));
     let mut changed = Vec::new();
     let correct = |blocks: Range<usize>| {
         let (mut found, mut changed) = (Nearest::default(), Vec::new());
         for block in blocks.filter(|&block| in_doubt(block)) {
             tree.nearest(level, block, VOTERS, &mut found);
-            for i in of_block(block) {
+            for i in of_block(block).filter(|&i| open(i)) {
                 let near = found.of(i % WIDTH).take(VOTERS).map(|n| n.id as usize);
                 if let Some(fit) = corrected(i, near, positions, radii, before) {
                     changed.push((id32(i), fit));

@@ -12,7 +12,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{collect_into, in_order};
+use nearmiss_lanes::parallel::{chunks, collect_into, in_order};
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
 use nearmiss_store::{Room, WorkError, Workspace};
@@ -22,7 +22,7 @@ use crate::bounds::boxes::OrientedBox;
 use crate::patch::covering::Solid;
 use crate::patch::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::point::disc::PointCode;
-use crate::point::gather::Index;
+use crate::point::gather::{GROWN, Index};
 use crate::point::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
 use crate::point::neighbours::Locality;
 use crate::point::spacing::{Look, Spacing};
@@ -132,6 +132,62 @@ pub(crate) fn fits(
         fits
     });
     Ok(all)
+}
+
+/// Fits the surface at the points of some leaves, in order. `looks` has their appearance.
+pub(crate) fn fits_of(
+    index: &Index<'_>,
+    positions: &[[f32; 3]],
+    radii: &[f32],
+    looks: &(impl Fn(usize) -> Look + Sync + Send),
+    leaves: &[u32],
+) -> Vec<Fit> {
+    let level = Level::new();
+    let some = chunks(leaves, |leaves| {
+        let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
+        for number in leaves {
+            let (points, about) = leaf(index, *number as usize);
+            let first = points.start;
+            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points], about: &about };
+            dispatch!(level, simd => leaf.fit(simd, index, &mut scratch, |at, i| {
+                fits.push(fitted(&at, looks(first + i)));
+            }));
+        }
+        fits
+    });
+    some.into_iter().flatten().collect()
+}
+
+/// Returns the codes of the points of some leaves, in order. `fits` has those of all points.
+pub(crate) fn codes_of(
+    index: &Index<'_>,
+    positions: &[[f32; 3]],
+    fits: &[Fit],
+    leaves: &[u32],
+) -> Vec<PointCode> {
+    let level = Level::new();
+    let some = chunks(leaves, |leaves| {
+        let (mut groups, mut near, mut codes) = (Vec::new(), Vec::new(), Vec::new());
+        for number in leaves {
+            let (points, about) = leaf(index, *number as usize);
+            let own = positions[points.clone()].iter().map(|p| sub(*p, about.centre)).map(|d| dot(d, d));
+            index.collect(level, about.centre, own.fold(0.0, f32::max).sqrt() * GROWN, &mut groups);
+            for i in points {
+                let (p, fit) = (positions[i], &fits[i]);
+                let gap = dispatch!(level, simd => simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        let near = index.supporting(simd, &groups, p, 0.0, &mut near);
+                        let blocks = near.iter().map(|&block| &index.blocks[block as usize]);
+                        widest_gap(simd, p, fit.normal, blocks)
+                    },
+                ));
+                codes.push(PointCode::new(fit.kind(), gap));
+            }
+        }
+        codes
+    });
+    some.into_iter().flatten().collect()
 }
 
 /// Returns the points of a leaf, and the box around them.

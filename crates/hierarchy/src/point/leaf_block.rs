@@ -4,6 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i16x16};
+use nearmiss_lanes::parallel::fill;
 use nearmiss_lanes::vector::sub;
 
 use crate::bounds::boxes::OrientedBox;
@@ -159,6 +160,18 @@ impl LeafParts<'_> {
     /// Returns the number of blocks in a leaf.
     pub(crate) fn blocks_a_leaf(topology: &Topology) -> usize {
         topology.leaf_size().div_ceil(WIDTH)
+    }
+
+    /// Sets the blocks and marks of all leaves. `bounds` returns the box of a leaf.
+    pub(crate) fn fill(
+        &self,
+        topology: &Topology,
+        bounds: impl Fn(usize) -> OrientedBox + Sync + Send,
+        (blocks, marks): (&mut [LeafBlock], &mut [u8]),
+    ) {
+        let blocks_a_leaf = Self::blocks_a_leaf(topology);
+        fill(blocks, |number| self.block(topology, number, &bounds(number / blocks_a_leaf)));
+        fill(marks, |leaf| self.marks(topology, leaf, &bounds(leaf)));
     }
 
     /// Returns block `number`, counted over all leaves. `bounds` is the box of its leaf.

@@ -46,10 +46,16 @@ pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32], 
 
 /// Returns the balls around `blocks` and their support, in groups.
 pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<PointBlock>, WorkError> {
+    let mut groups = work.room(blocks.len().div_ceil(PointBlock::WIDTH))?;
+    fill_groups(blocks, &mut groups);
+    Ok(groups)
+}
+
+/// Sets `groups` to the balls around `blocks` and their support.
+pub(crate) fn fill_groups(blocks: &[PointBlock], groups: &mut [PointBlock]) {
     const WIDTH: usize = PointBlock::WIDTH;
     let level = Level::new();
-    let mut groups = work.room(blocks.len().div_ceil(WIDTH))?;
-    fill(&mut groups, |number| {
+    fill(groups, |number| {
         let blocks = &blocks[number * WIDTH..blocks.len().min((number + 1) * WIDTH)];
         let mut group = PointBlock::EMPTY;
         for (lane, block) in blocks.iter().enumerate() {
@@ -64,7 +70,6 @@ pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<Poi
         }
         group
     });
-    Ok(groups)
 }
 
 /// Returns a ball that contains the support balls of all points of a block.

@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_index::{BlockTree, Nearest, PointBlock};
-use nearmiss_lanes::parallel::{collect_into, in_order};
+use nearmiss_lanes::parallel::{chunks, collect_into, in_order};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::symmetric_eigen;
 
@@ -134,6 +134,39 @@ pub(crate) fn spacings(
         }
     }
     Ok(room)
+}
+
+/// Returns the spacings of the points of some blocks, sixteen for each, and their radii: smoothed
+/// along their first neighbours, whose radii are known, and at most `reach`. The votes of
+/// neighbours about bends are left out.
+pub(crate) fn spacings_of(
+    points: &[[f32; 3]],
+    tree: &BlockTree<'_>,
+    (neighbours, reach): (usize, f32),
+    radii: &[f32],
+    blocks: &[u32],
+) -> Vec<(Spacing, f32)> {
+    let some = chunks(blocks, |blocks| {
+        let (mut search, mut found) = (Search::new(tree, points), Vec::new());
+        for block in blocks {
+            let first = *block as usize * WIDTH;
+            search.start(*block as usize);
+            for i in first..first + WIDTH {
+                if i >= points.len() {
+                    found.push((Spacing::default(), 0.0));
+                    continue;
+                }
+                let mut spacing = search.spacing(i, neighbours);
+                search.look(i, neighbours);
+                let smooth = |least: f32, n: &(f64, usize)| least.min(radii[n.1] + GROWTH * length(n));
+                let mut radius = search.near[1..].iter().fold(spacing.radius, smooth);
+                limit(std::slice::from_mut(&mut spacing), std::slice::from_mut(&mut radius), reach);
+                found.push((spacing, radius));
+            }
+        }
+        found
+    });
+    some.into_iter().flatten().collect()
 }
 
 /// A search for the neighbours of the points of a block.

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use bytemuck::bytes_of;
 use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{fill, on_threads};
+use nearmiss_lanes::parallel::on_threads;
 use nearmiss_lanes::vector::dot;
 use nearmiss_store::{Array, Workspace};
 use nearmiss_surface::SurfacePlan;
@@ -222,7 +222,7 @@ impl PointHierarchy {
     }
 
     /// Recomputes leaf blocks and marks from the points and boxes.
-    fn renew_leaves(&mut self) {
+    pub(crate) fn renew_leaves(&mut self) {
         let (mut blocks, mut marks) =
             (std::mem::take(&mut self.arrays.leaf_blocks), std::mem::take(&mut self.arrays.marks));
         self.fill_leaves(blocks.to_mut(), marks.to_mut());
@@ -230,11 +230,8 @@ impl PointHierarchy {
     }
 
     fn fill_leaves(&self, blocks: &mut [LeafBlock], marks: &mut [u8]) {
-        let (tree, topology, leaves) = (self.tree(), &self.topology, self.leaf_parts());
-        let bounds = |leaf: usize| tree.bounds(topology.leaf(leaf));
-        let blocks_a_leaf = LeafParts::blocks_a_leaf(topology);
-        fill(blocks, |number| leaves.block(topology, number, &bounds(number / blocks_a_leaf)));
-        fill(marks, |leaf| leaves.marks(topology, leaf, &bounds(leaf)));
+        let (tree, topology) = (self.tree(), &self.topology);
+        self.leaf_parts().fill(topology, |leaf| tree.bounds(topology.leaf(leaf)), (blocks, marks));
     }
 
     /// Returns the arrays that leaf blocks are built from.
@@ -258,6 +255,11 @@ impl PointHierarchy {
         hash.update(bytemuck::cast_slice(self.positions()));
         hash.update(bytemuck::cast_slice(arrays.discs.codes));
         hash.update(bytemuck::cast_slice(arrays.radii));
+        // Coverings are withheld where discs were carried along. Then normals, and with them
+        // enclosures, do not follow from the rest.
+        if arrays.coverings.first().is_some_and(|root| root.sampling == f32::INFINITY) {
+            hash.update(bytemuck::cast_slice(arrays.normals));
+        }
         Outline {
             identity: hash.digest(),
             surface: Ball::about(&arrays.enclosure(0)),
@@ -413,7 +415,12 @@ fn build(
     options: &BuildOptions,
     work: &Workspace,
 ) -> Result<PointHierarchy, BuildError> {
-    let Prepared { meta, plan, topology, arrays, positions } = prepare(points, options, work)?;
+    assembled(prepare(points, options, work)?, work)
+}
+
+/// Adds leaf blocks, marks and outline to a prepared scan.
+pub(crate) fn assembled(prepared: Prepared, work: &Workspace) -> Result<PointHierarchy, BuildError> {
+    let Prepared { meta, plan, topology, arrays, positions } = prepared;
     let positions = Array::from(positions).into();
     let mut hierarchy = PointHierarchy { meta, plan, topology, arrays, positions };
     let mut leaf_blocks = work.room(topology.leaves() * LeafParts::blocks_a_leaf(&topology))?;

@@ -18,7 +18,7 @@ use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::points::ScanPoints;
 use crate::scan::sampling::{Sampling, set_reaches};
 use crate::scan::share;
-use crate::tree::split::{Item, split};
+use crate::tree::split::{Item, bound_in_order, split};
 use crate::tree::topology::Topology;
 use crate::tree::wide::Bare;
 
@@ -111,8 +111,53 @@ impl Ordered {
         }
         drop(items);
         work.progress().reach(share::TREE);
+        let mut ordered =
+            Self::classified(topology, boxes, (positions, source), (options, unit, count), work)?;
+        let Self { boxes, positions, source, radii, fits, blocks, plan, summary, .. } = &mut ordered;
+        if let Some((mut items, before)) = dense_first(positions, fits, options.leaf_size as usize, work)? {
+            summary.dense = before;
+            split(&mut items, &topology, before, boxes);
+            let items: &[Item] = &items;
+            fill(positions, |i| items[i].position);
+            *source = reordered(items, source, work)?;
+            *fits = reordered(items, fits, work)?;
+            *radii = reordered(items, radii, work)?;
+            set_reaches(&topology, boxes, radii);
+            neighbours::blocks(plan, positions, radii, blocks);
+        }
+        work.progress().reach(share::ORDERED);
+        Ok(ordered)
+    }
 
-        let Sampling { spacings, mut radii, sampling_radius, reach, plan, mut blocks } =
+    /// Keeps the order of `points`, the first `dense` of which fill leaves of their own.
+    pub(crate) fn kept(
+        points: &ScanPoints<'_>,
+        dense: usize,
+        options: &BuildOptions,
+        work: &Workspace,
+    ) -> Result<Self, BuildError> {
+        let count = points.positions.len();
+        let topology = Topology::new(id32(count), options.leaf_size);
+        let mut items = work.room(count)?;
+        fill(&mut items, |i| Item { position: points.positions[i], index: points.source[i] });
+        let mut boxes = work.room(topology.len())?;
+        bound_in_order(&items, &topology, &mut boxes);
+        let (mut positions, mut source) = (work.room(count)?, work.room(count)?);
+        positions.copy_from_slice(points.positions);
+        source.copy_from_slice(points.source);
+        let unit = 1.0 / points.frame.scale;
+        Self::classified(topology, boxes, (positions, source), (options, unit, dense), work)
+    }
+
+    /// Computes radii and classes of points in the order of a tree with these boxes.
+    fn classified(
+        topology: Topology,
+        mut boxes: Room<OrientedBox>,
+        (positions, source): (Room<[f32; 3]>, Room<u32>),
+        (options, unit, dense): (&BuildOptions, f64, usize),
+        work: &Workspace,
+    ) -> Result<Self, BuildError> {
+        let Sampling { spacings, radii, sampling_radius, reach, plan, blocks } =
             Sampling::of(&positions, (&topology, &mut boxes), options, unit, work)?;
         let groups = groups_of(&blocks, work)?;
         let bare = Bare::new(work, topology, &boxes)?;
@@ -120,22 +165,8 @@ impl Ordered {
         let mut fits = fits(&index, &positions, (&radii, &spacings), work)?;
         drop((bare, groups, spacings));
         work.progress().reach(share::FITS);
-        let neighbours = BlockBoxes::new_in(work, &blocks, count)?;
+        let neighbours = BlockBoxes::new_in(work, &blocks, positions.len())?;
         vote(&neighbours.over(&blocks), &positions, &radii, &mut fits);
-        drop(neighbours);
-        let mut dense = count;
-        if let Some((mut items, before)) = dense_first(&positions, &fits, options.leaf_size as usize, work)? {
-            dense = before;
-            split(&mut items, &topology, dense, &mut boxes);
-            let items: &[Item] = &items;
-            fill(&mut positions, |i| items[i].position);
-            source = reordered(items, &source, work)?;
-            fits = reordered(items, &fits, work)?;
-            radii = reordered(items, &radii, work)?;
-            set_reaches(&topology, &mut boxes, &radii);
-            neighbours::blocks(&plan, &positions, &radii, &mut blocks);
-        }
-        work.progress().reach(share::ORDERED);
         let summary = Summary { dense, sampling_radius, reach };
         Ok(Self { topology, boxes, positions, source, radii, fits, blocks, plan, summary })
     }

@@ -40,8 +40,17 @@ pub(crate) fn prepare(
     options: &BuildOptions,
     work: &Workspace,
 ) -> Result<Prepared, BuildError> {
-    let Ordered { topology, mut boxes, positions, source, radii, fits, blocks, plan, summary } =
-        Ordered::of(points, options, work)?;
+    finish(points, Ordered::of(points, options, work)?, options, work)
+}
+
+/// Does the rest for points that are in order.
+pub(crate) fn finish(
+    points: &ScanPoints<'_>,
+    ordered: Ordered,
+    options: &BuildOptions,
+    work: &Workspace,
+) -> Result<Prepared, BuildError> {
+    let Ordered { topology, mut boxes, positions, source, radii, fits, blocks, plan, summary } = ordered;
     let Summary { dense, sampling_radius, reach } = summary;
     let groups = groups(&blocks, work)?;
     let bare = Bare::new(work, topology, &boxes)?;
@@ -115,7 +124,7 @@ fn bounds(
     siblings(topology, boxes, &mut of_siblings);
     let growths = |growths: &[Growth]| {
         let mut of_siblings = work.room(topology.inner())?;
-        growths_of_siblings(topology, growths, &mut of_siblings);
+        growths_of_siblings(topology, |id| growths[id], &mut of_siblings);
         Ok::<_, WorkError>(of_siblings.into())
     };
     Ok(Arrays {

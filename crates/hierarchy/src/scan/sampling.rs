@@ -52,13 +52,16 @@ impl Sampling {
         work.progress().reach(share::SPACINGS);
         let mut radii = smooth(&tree, &spacings, work)?;
         work.progress().reach(share::RADII);
+        let mut counts = Vec::new();
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-        let reach = options.reach.map_or_else(|| REACH * quantile(&radii), |reach| (reach * unit) as f32);
+        let reach = options
+            .reach
+            .map_or_else(|| REACH * quantile(&radii, &mut counts), |reach| (reach * unit) as f32);
         if !(reach.is_normal() && reach >= f32::EPSILON * extent(positions)) {
             return Err(BuildError::Reach(f64::from(reach) / unit));
         }
         limit(&mut spacings, &mut radii, reach);
-        let sampling_radius = quantile(&radii);
+        let sampling_radius = quantile(&radii, &mut counts);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
         set_reaches(topology, boxes, &radii);
         for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
@@ -83,12 +86,13 @@ fn extent(positions: &[[f32; 3]]) -> f32 {
 
 /// Returns the [sampling radius](sampling_rank) of radii, none of which may be negative. Numbers
 /// that are not negative have the same order as their bits. So the upper halves of the bits are
-/// counted first, then the lower halves.
-fn quantile(radii: &[f32]) -> f32 {
+/// counted first, then the lower halves. `counts` is reused memory.
+pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<usize>) -> f32 {
     const HALF: u32 = 16;
     let mut rank = sampling_rank(radii.len());
     let mut half_at_rank = |halves: &mut dyn Iterator<Item = u32>| {
-        let mut counts = vec![0_usize; 1 << HALF];
+        counts.clear();
+        counts.resize(1 << HALF, 0);
         halves.for_each(|half| counts[half as usize] += 1);
         let half = counts.iter().position(|&count| {
             let is_here = rank < count;

@@ -12,7 +12,8 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, f64x2, f64x4};
 use nearmiss_geometry::NodeId;
-use nearmiss_lanes::parallel::both;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::{both, change_each};
 use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::{along, greatest, least};
 use nearmiss_surface::symmetric_eigen;
@@ -45,6 +46,15 @@ const JUDGED_BY: usize = 512;
 pub(crate) fn split(items: &mut [Item], topology: &Topology, dense: usize, boxes: &mut [OrientedBox]) {
     let boxes = Mutex::new(boxes);
     Place { items, dense, half: Half::ALL }.split(topology, &boxes);
+}
+
+/// Sets `boxes` to the boxes around the points of all nodes, whose order stays. O(n log n).
+pub(crate) fn bound_in_order(items: &[Item], topology: &Topology, boxes: &mut [OrientedBox]) {
+    const AT_ONCE: usize = 16;
+    let level = Level::new();
+    change_each(boxes, AT_ONCE, |id, bounds| {
+        *bounds = about(level, &items[topology.points(NodeId(id32(id)))]);
+    });
 }
 
 /// Returns the box around some points along their principal axes.

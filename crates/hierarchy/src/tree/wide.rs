@@ -169,6 +169,21 @@ impl<'a> Tree<'a> {
         self.growth(part, id).of(&self.bounds(id))
     }
 
+    /// Returns the sum of the surface areas of all boxes, in areas of the root's box; NaN if that
+    /// has none. It is the cost of a traversal by the surface area heuristic (Goldsmith & Salmon
+    /// 1987) without constants. O(n).
+    pub(crate) fn cost(&self) -> f64 {
+        let area = |[x, y, z]: [f32; 3]| {
+            let [x, y, z] = [x, y, z].map(f64::from);
+            x * y + y * z + z * x
+        };
+        let of_children = |siblings: &Siblings| {
+            let [x, y, z] = &siblings.half;
+            (0..FAN).map(|lane| area([x[lane], y[lane], z[lane]])).sum::<f64>()
+        };
+        1.0 + self.siblings.iter().map(of_children).sum::<f64>() / area(self.root.bounds.half)
+    }
+
     /// Returns the greatest local radius of the points under a node.
     #[inline]
     #[must_use]
@@ -375,12 +390,16 @@ pub(crate) fn siblings(topology: &Topology, boxes: &[OrientedBox], out: &mut [Si
     });
 }
 
-/// Rearranges the growths of all nodes, in the order of their ids, into those of siblings.
-pub(crate) fn growths_of_siblings(topology: &Topology, growths: &[Growth], out: &mut [Growths]) {
+/// Rearranges the growths of all nodes, given by the index of their ids, into those of siblings.
+pub(crate) fn growths_of_siblings(
+    topology: &Topology,
+    growth: impl Fn(usize) -> Growth + Sync + Send,
+    out: &mut [Growths],
+) {
     fill(out, |i| {
         let mut siblings = Growths::default();
         for (lane, id) in topology.children(NodeId(id32(i))).iter().enumerate() {
-            siblings.set(lane, &growths[id.index()]);
+            siblings.set(lane, &growth(id.index()));
         }
         siblings
     });

@@ -3,6 +3,7 @@
 
 mod apart;
 mod coverings;
+mod deforming;
 mod enclosures;
 mod kinds;
 mod levels;

@@ -84,7 +84,7 @@ fn is_clear(at: &oracle::Evaluation, x: [f64; 3]) -> bool {
 
 /// Compares f with the naive implementation at points near the stored ones. Returns the number of
 /// points that are ok in both.
-fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
+pub(crate) fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
     let points = stored(scan);
     let radii: Vec<f64> = scan.radii().iter().map(|&r| f64::from(r)).collect();
     let twin = SurfaceTwin::with_radii(&points, &radii, parameters);

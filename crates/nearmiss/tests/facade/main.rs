@@ -7,6 +7,8 @@ mod curves;
 mod geodesic;
 mod hostile;
 mod invariance;
+mod moving_meshes;
+mod moving_scans;
 mod obstacles;
 mod saved;
 mod saved_meshes;

@@ -231,6 +231,16 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
         body.map(|body| self.place(id, Entry::new(body, pose))).is_some()
     }
 
+    /// Changes a body, as a deforming one changes in every frame, and returns the result of `change`;
+    /// `None` if no body has this id. O(log n) besides.
+    pub fn change<R>(&mut self, id: BodyId, change: impl FnOnce(&mut Body<S, M>) -> R) -> Option<R> {
+        let pose = self.bodies.get(&id)?.pose;
+        let mut body = self.remove_body(id)?;
+        let changed = change(&mut body);
+        self.place(id, Entry::new(body, &pose));
+        Some(changed)
+    }
+
     fn place(&mut self, id: BodyId, entry: Entry<S, M>) {
         match entry.bounds {
             Some(bounds) => self.tree.insert(Leaf::new(id, &bounds)),

@@ -30,6 +30,9 @@ impl PairVisitor for Search<'_, '_> {
     fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open) -> ControlFlow<()> {
         for lane in Bits(self.pair.lanes_that_may_meet(leaves)) {
             let triangles = MeshPairing::triangles(leaves, lane);
+            if !self.pair.compares(triangles) {
+                continue;
+            }
             if let Some(all) = &mut self.all {
                 if let Some(contact) = self.pair.contact(triangles) {
                     self.met.get_or_insert(triangles);

@@ -34,6 +34,8 @@ pub(crate) struct MeshPairing<'a> {
     pub(crate) meter: Meter,
     /// The SIMD instructions to use. Results do not depend on them.
     pub(crate) level: Level,
+    /// `true` if both meshes are the same one, compared with itself.
+    is_of_itself: bool,
 }
 
 impl<'a> MeshPairing<'a> {
@@ -51,7 +53,23 @@ impl<'a> MeshPairing<'a> {
         let leaves = [a, b].map(|mesh| mesh.tree.topology().leaves() as u64);
         let meter = Meter::of_leaves(budget, leaves, LEAF_PAIR);
         let gap = balls.gap;
-        Some(Self { meshes, a, b, stored, relative, pose, gap, meter, level })
+        Some(Self { meshes, a, b, stored, relative, pose, gap, meter, level, is_of_itself: false })
+    }
+
+    /// The same pair, of a mesh with itself: only triangles without a common corner are compared,
+    /// and each two of them once.
+    pub(crate) fn of_itself(self) -> Self {
+        Self { is_of_itself: true, ..self }
+    }
+
+    /// Returns `true` if these triangles are to be compared.
+    #[inline]
+    pub(crate) fn compares(&self, [i, j]: [usize; 2]) -> bool {
+        if !self.is_of_itself {
+            return true;
+        }
+        let (a, b) = (self.a.corners(i), self.b.corners(j));
+        i < j && !a.iter().any(|p| b.contains(p))
     }
 
     /// The identities of both meshes.

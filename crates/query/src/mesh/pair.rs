@@ -49,6 +49,11 @@ impl MeshScratch {
             table: None,
         }
     }
+
+    /// The instructions to use, and an empty stack.
+    pub(crate) fn stack(&mut self) -> (Level, &mut Stack) {
+        (self.level, &mut self.stack)
+    }
 }
 
 /// Two placed meshes and the budget of each question about them.
@@ -172,7 +177,8 @@ impl<'a> MeshPair<'a> {
 }
 
 /// The answer for an invalid pose.
-const INVALID: MeshAnswer = MeshAnswer { verdict: MeshVerdict::Pose, likelihood: 0.5, statistics: NOTHING };
+pub(crate) const INVALID: MeshAnswer =
+    MeshAnswer { verdict: MeshVerdict::Pose, likelihood: 0.5, statistics: NOTHING };
 
 /// The distance for an invalid pose.
 const UNKNOWN: MeshDistance = MeshDistance {

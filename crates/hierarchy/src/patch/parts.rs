@@ -1,0 +1,163 @@
+//! Boxes and enclosures of all nodes from the points alone, without a look at their neighbours.
+//!
+//! A place of the obstacle that belongs to a point on a sheet is within its local radius, and within
+//! the thickness of the sheet of its tangent plane: both are parts of the definition
+//! (`docs/theory/obstacle.md`). So a cylinder contains it. A place of the surface is within half a
+//! support radius of its nearest point (`docs/theory/certificates.md`, fact 2). Enclosures from
+//! neighbours ([`crate::patch::enclosure`]) are tighter, at ten times the cost.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::change_both;
+use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
+
+use crate::bounds::boxes::OrientedBox;
+use crate::bounds::growth::Growth;
+use crate::point::disc::DiscRadii;
+use crate::point::kind::{SLAB, THICKNESS, ball, cell_radius, is_on_sheet, obstacle_ball};
+use crate::tree::topology::Topology;
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// The number of nodes that a thread takes at once.
+const AT_ONCE: usize = 16;
+
+/// Allowance for the relative rounding error of the extents of a cylinder.
+const GROWN: f32 = 1.0 + 1e-4;
+
+/// The parts of a block of points, side by side.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(crate) struct PartBlock {
+    normal: [[f32; WIDTH]; 3],
+    radius: [f32; WIDTH],
+    disc: [f32; WIDTH],
+    /// The greater radius of the balls of a point; 0 for points without.
+    ball: [f32; WIDTH],
+    /// The radius of the cylinder about the cell of a point on a sheet, and half its height; 0 for
+    /// other points.
+    cell: [f32; WIDTH],
+    slab: [f32; WIDTH],
+}
+
+/// The arrays that parts follow from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Parts<'a> {
+    pub(crate) normals: &'a [[f32; 3]],
+    pub(crate) discs: DiscRadii<'a>,
+    /// The number of dense points, which come first.
+    pub(crate) dense: usize,
+}
+
+impl Parts<'_> {
+    /// Returns the parts of the points in block `number`.
+    pub(crate) fn block(&self, number: usize) -> PartBlock {
+        let Self { normals, discs, dense } = *self;
+        let mut block = PartBlock::zeroed();
+        let first = number * WIDTH;
+        for i in first..(first + WIDTH).min(normals.len()) {
+            let (lane, kind, radius) = (i - first, discs.codes[i].kind(), discs.radii[i]);
+            for k in 0..3 {
+                block.normal[k][lane] = normals[i][k];
+            }
+            block.radius[lane] = radius;
+            block.disc[lane] = discs.get(i);
+            let small = ball(kind, radius, discs.sampling_radius);
+            block.ball[lane] = small.max(obstacle_ball(i, dense, kind, radius));
+            if is_on_sheet(i, dense, kind) {
+                block.cell[lane] = cell_radius(radius, discs.reach) * GROWN;
+                block.slab[lane] = SLAB * radius * GROWN;
+            }
+        }
+        block
+    }
+}
+
+/// Replaces the box of each node by the smallest one along its axes about the discs and balls of the
+/// node's points, with their greatest radius, and sets its growths to the enclosures of the surface
+/// and of the obstacle. The surface is within `beyond` of the points. O(n log n).
+pub(crate) fn bound_parts(
+    topology: &Topology,
+    (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]]),
+    (points, parts): (&[PointBlock], &[PartBlock]),
+    beyond: f32,
+) {
+    let (level, beyond) = (Level::new(), beyond * GROWN);
+    change_both(boxes, growths, AT_ONCE, |id, bounds, growths| {
+        let range = topology.points(NodeId(id32(id)));
+        let Extents { discs, cells, points, reach } = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || extents(simd, (points, parts), range, &bounds.axes),
+        ));
+        *bounds = OrientedBox::spanned(bounds.axes, discs[0], discs[1], reach);
+        let surface = [points[0].map(|x| x - beyond), points[1].map(|x| x + beyond)];
+        *growths = [surface, cells].map(|[low, high]| Growth::new(bounds, low, high));
+    });
+}
+
+/// The least and greatest coordinates of some points along three axes.
+struct Extents {
+    /// Of discs and balls.
+    discs: [[f32; 3]; 2],
+    /// Of cylinders about cells, and of points.
+    cells: [[f32; 3]; 2],
+    points: [[f32; 3]; 2],
+    /// The greatest local radius.
+    reach: f32,
+}
+
+#[inline(always)]
+fn extents<S: Simd>(
+    simd: S,
+    (points, parts): (&[PointBlock], &[PartBlock]),
+    range: Range<usize>,
+    axes: &[[f32; 3]; 3],
+) -> Extents {
+    let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
+    let mut low = [[most; 3]; 3];
+    let mut high = [[none; 3]; 3];
+    let mut reach = f32x16::splat(simd, 0.0);
+    for number in range.start / WIDTH..range.end.div_ceil(WIDTH) {
+        let block = &parts[number];
+        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, &range)));
+        let lanes = |row: &[f32; WIDTH]| f32x16::load_array_ref(simd, row);
+        let (position, normal) = (load(simd, &points[number].position), load(simd, &block.normal));
+        let (disc, ball) = (lanes(&block.disc), lanes(&block.ball));
+        let (cell, slab) = (lanes(&block.cell), lanes(&block.slab));
+        let radius = simd.select_f32x16(inside, lanes(&block.radius), f32x16::splat(simd, 0.0));
+        reach = reach.max(radius);
+        for k in 0..3 {
+            // ‖n × axis‖, without the cancellation of √(1 − (n·axis)²).
+            let [ax, ay, az] = axes[k];
+            let [x, y, z] = normal;
+            let cosine = along(normal, axes[k]).abs();
+            let (x, y, z) = (z * ay - y * az, x * az - z * ax, y * ax - x * ay);
+            let sine = (x * x + y * y + z * z).sqrt();
+            let spreads = [
+                (disc * (sine + THICKNESS)).max(ball),
+                cell * sine + slab * cosine,
+                f32x16::splat(simd, 0.0),
+            ];
+            let middle = along(position, axes[k]);
+            for j in 0..3 {
+                low[j][k] = low[j][k].min(simd.select_f32x16(inside, middle - spreads[j], most));
+                high[j][k] = high[j][k].max(simd.select_f32x16(inside, middle + spreads[j], none));
+            }
+        }
+    }
+    let mut found = [[[0.0; 3]; 2]; 3];
+    for j in 0..3 {
+        for k in 0..3 {
+            found[j][0][k] = least(low[j][k], f32::INFINITY);
+            found[j][1][k] = greatest(high[j][k], f32::NEG_INFINITY);
+        }
+    }
+    let [discs, cells, points] = found;
+    Extents { discs, cells, points, reach: greatest(reach, 0.0) }
+}

@@ -1,0 +1,186 @@
+//! The motion of the points of a leaf as an affine map, fitted by least squares, and how a disc
+//! follows it.
+
+use nearmiss_lanes::vector::{cross, dot, sub, tangents};
+
+/// The ridge of the fit as a share of the second moments. It draws directions in which the points do
+/// not extend, such as the normal of a flat patch, towards the identity.
+const RIDGE: f64 = 1e-5;
+
+/// Stretches that differ from 1 by less count as none, so that rigid motions keep all radii.
+const RIGID: f32 = 1e-3;
+
+/// A leaf at rest: what the fit needs of its points.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Rest {
+    middle: [f32; 3],
+    /// The inverse of the second moments with the ridge, as xx xy xz yy yz zz.
+    inverse: [f32; 6],
+    ridge: f32,
+    /// The mean normal, up to signs.
+    normal: [f32; 3],
+}
+
+/// The motion of a leaf since its rest.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Motion {
+    /// For each column of the linear map, the cross product of the two others.
+    cofactors: [[f32; 3]; 3],
+    /// The greatest stretch of a length in the tangent plane.
+    pub(crate) stretch: f32,
+    /// `false` if lengths in the tangent plane have changed too much, or no affine map moves the
+    /// points.
+    pub(crate) is_carried: bool,
+}
+
+fn middle(points: &[[f32; 3]]) -> [f32; 3] {
+    // Relative to the first point, where rounding is least.
+    let (first, mut sum) = (points[0], [0.0_f32; 3]);
+    for p in points {
+        let d = sub(*p, first);
+        sum = [sum[0] + d[0], sum[1] + d[1], sum[2] + d[2]];
+    }
+    #[expect(clippy::cast_precision_loss, reason = "at most 64")]
+    let count = points.len() as f32;
+    [0, 1, 2].map(|k| first[k] + sum[k] / count)
+}
+
+impl Rest {
+    /// A leaf with these points and normals.
+    pub(crate) fn new(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Self {
+        let middle = middle(points);
+        let mut s = [0.0_f64; 6];
+        for p in points {
+            let [x, y, z] = sub(*p, middle).map(f64::from);
+            for (sum, product) in s.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
+                *sum += product;
+            }
+        }
+        let ridge = RIDGE * (s[0] + s[3] + s[5]);
+        let [a, b, c, d, e, f] = [s[0] + ridge, s[1], s[2], s[3] + ridge, s[4], s[5] + ridge];
+        let adjugate =
+            [d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b];
+        let determinant = a * adjugate[0] + b * adjugate[1] + c * adjugate[2];
+        #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+        let inverse = adjugate.map(|x| (x / determinant) as f32);
+        let mut normal = [0.0_f32; 3];
+        for n in normals {
+            let side = 1.0_f32.copysign(dot(*n, normals[0]));
+            normal = [0, 1, 2].map(|k| normal[k] + side * n[k]);
+        }
+        let length = dot(normal, normal).sqrt();
+        let normal = if length > 0.0 { normal.map(|c| c / length) } else { [0.0, 0.0, 1.0] };
+        #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+        let ridge = ridge as f32;
+        Self { middle, inverse, ridge, normal }
+    }
+
+    /// Fits the motion from `points`, at rest, to the places `now`. A carried leaf stretches by at
+    /// most `most` or its reciprocal, and each point is within `off` of its radius of its place.
+    pub(crate) fn motion(
+        &self,
+        points: &[[f32; 3]],
+        now: &[[f32; 3]],
+        radii: &[f32],
+        (most, off): (f32, f32),
+    ) -> Motion {
+        let middle = middle(now);
+        // Rows of Σ (q − q̄)(p − p̄)ᵀ.
+        let mut rows = [[self.ridge, 0.0, 0.0], [0.0, self.ridge, 0.0], [0.0, 0.0, self.ridge]];
+        for (p, q) in points.iter().zip(now) {
+            let (p, q) = (sub(*p, self.middle), sub(*q, middle));
+            for i in 0..3 {
+                for k in 0..3 {
+                    rows[i][k] += q[i] * p[k];
+                }
+            }
+        }
+        let [a, b, c, d, e, f] = self.inverse;
+        let linear = rows.map(|row| [dot(row, [a, b, c]), dot(row, [b, d, e]), dot(row, [c, e, f])]);
+        let apply = |v: [f32; 3]| linear.map(|row| dot(row, v));
+        let (u, v) = tangents(self.normal);
+        let (u, v) = (apply(u), apply(v));
+        let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
+        // The eigenvalues of the metric in the tangent plane.
+        let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
+        let apart = (half * half + uv * uv).sqrt();
+        let [low, high] = [(mean - apart).max(0.0).sqrt(), (mean + apart).sqrt()];
+        let mut is_carried = low * most >= 1.0 && high <= most;
+        for ((p, q), radius) in points.iter().zip(now).zip(radii) {
+            let d = sub(sub(*q, middle), apply(sub(*p, self.middle)));
+            // Also false for NaN.
+            is_carried &= dot(d, d) <= (off * radius) * (off * radius);
+        }
+        let column = |k: usize| [linear[0][k], linear[1][k], linear[2][k]];
+        let [x, y, z] = [column(0), column(1), column(2)];
+        Motion {
+            cofactors: [cross(y, z), cross(z, x), cross(x, y)],
+            stretch: if (high - 1.0).abs() < RIGID { 1.0 } else { high },
+            is_carried,
+        }
+    }
+}
+
+impl Motion {
+    /// Returns where a unit normal points after the motion. If the motion flattens its plane, it
+    /// stays.
+    pub(crate) fn normal(&self, n: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = &self.cofactors;
+        let m = [0, 1, 2].map(|k| n[0] * x[k] + n[1] * y[k] + n[2] * z[k]);
+        let length = dot(m, m).sqrt();
+        if length > f32::MIN_POSITIVE && length.is_finite() { m.map(|c| c / length) } else { n }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn patch() -> Vec<[f32; 3]> {
+        let lattice = (0..16_u8).map(|i| [f32::from(i % 4), f32::from(i / 4)]);
+        lattice.map(|[x, y]| [x + 100.0, y - 50.0, 0.05 * (x - 1.5) * (x - 1.5)]).collect()
+    }
+
+    fn motion_by(f: impl Fn([f32; 3]) -> [f32; 3]) -> Motion {
+        let points = patch();
+        let rest = Rest::new(&points, &[[0.0, 0.0, 1.0]; 16]);
+        let now: Vec<[f32; 3]> = points.iter().map(|p| f(*p)).collect();
+        rest.motion(&points, &now, &[1.4; 16], (1.25, 0.2))
+    }
+
+    fn is_near(a: [f32; 3], b: [f32; 3]) -> bool {
+        (0..3).all(|k| (a[k] - b[k]).abs() < 5e-3)
+    }
+
+    #[test]
+    fn a_rigid_motion_keeps_lengths_and_turns_normals() {
+        let still = motion_by(|p| p);
+        assert!(still.is_carried && still.stretch == 1.0, "{still:?}");
+        assert!(is_near(still.normal([0.6, 0.0, 0.8]), [0.6, 0.0, 0.8]), "{still:?}");
+        // A quarter turn about the y axis.
+        let turned = motion_by(|[x, y, z]| [z + 7.0, y, -x]);
+        assert!(turned.is_carried && turned.stretch == 1.0, "{turned:?}");
+        assert!(is_near(turned.normal([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]), "{turned:?}");
+        assert!(is_near(turned.normal([0.2, 0.0, 0.98]), [0.98, 0.0, -0.2]), "{turned:?}");
+    }
+
+    #[test]
+    fn a_shear_turns_normals_by_the_cofactors() {
+        let sheared = motion_by(|[x, y, z]| [x, y, z + 0.2 * x]);
+        let length = (1.0_f32 + 0.04).sqrt();
+        assert!(is_near(sheared.normal([0.0, 0.0, 1.0]), [-0.2 / length, 0.0, 1.0 / length]), "{sheared:?}");
+        assert!((sheared.stretch - length).abs() < 1e-3 && sheared.is_carried, "{sheared:?}");
+    }
+
+    #[test]
+    fn stretches_collapses_and_tears_are_not_carried() {
+        assert!(motion_by(|[x, y, z]| [1.2 * x, y, z]).is_carried, "within the factor");
+        assert!(!motion_by(|[x, y, z]| [1.3 * x, y, z]).is_carried, "stretched");
+        assert!(!motion_by(|[x, y, z]| [x, 0.7 * y, z]).is_carried, "compressed");
+        assert!(!motion_by(|_| [1.0, 2.0, 3.0]).is_carried, "in one point");
+        assert!(!motion_by(|[x, y, z]| [x, y, if x > 101.0 { z + 1.5 } else { z }]).is_carried, "torn");
+        assert!(!motion_by(|[x, ..]| [x, f32::NAN, 0.0]).is_carried, "NaN");
+        let flat = motion_by(|_| [1.0, 2.0, 3.0]).normal([0.0, 0.6, 0.8]);
+        assert!(flat.iter().all(|c| c.is_finite()), "a direction, whatever it is: {flat:?}");
+    }
+}

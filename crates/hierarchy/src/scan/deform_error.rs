@@ -1,0 +1,92 @@
+//! Why new positions cannot replace those of a deforming mesh or scan.
+
+use nearmiss_geometry::{Aabb, CloudError};
+use thiserror::Error;
+
+use crate::scan::options::BuildError;
+
+/// The error of a deformation. What was to be deformed is unchanged.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DeformError {
+    /// The number of positions differs from that of the first frame.
+    #[error("expected {expected} {what}, as in the first frame, got {got}; start anew from this frame")]
+    Count {
+        /// "points" or "vertices".
+        what: &'static str,
+        /// The number in the first frame.
+        expected: usize,
+        /// The number of positions given.
+        got: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("expected finite coordinates, got {position:?} ({what} {index}); correct it")]
+    NotFinite {
+        /// "point" or "vertex".
+        what: &'static str,
+        /// Its index.
+        index: usize,
+        /// Its coordinates.
+        position: [f64; 3],
+    },
+    /// The positions are so far away, or the extent so large, that coordinates overflow.
+    #[error(
+        "expected coordinates below {limit:e}, got {got:e}; scale the positions, or start anew from this frame"
+    )]
+    TooFar {
+        /// The limit.
+        limit: f64,
+        /// The greatest coordinate.
+        got: f64,
+    },
+    /// Points that were repeated in the first frame are not any longer.
+    #[error(
+        "expected point {index} to stay with point {twin}, with which it coincided in the first frame, \
+         got a distance of {distance}; start anew from this frame"
+    )]
+    Apart {
+        /// The index of the repeated point.
+        index: u32,
+        /// The index of the point that represents it.
+        twin: u32,
+        /// Their distance now.
+        distance: f64,
+    },
+    /// The scan that is to deform was prepared from repeated points, and it is not known which.
+    #[error("expected distinct points, got {count} repeated ones; start from the points of the first frame")]
+    Repeated {
+        /// Their number.
+        count: usize,
+    },
+    /// The scan has a graph, or uses distances along one.
+    #[error(
+        "expected a scan without a graph, got one with: paths along it do not follow a deformation; \
+         prepare the scan without a graph, or prepare each frame anew with one"
+    )]
+    Graph,
+    /// The points of a frame are no cloud.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// A frame cannot be prepared.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+}
+
+/// Returns the bounds of positions, all of which must be finite. `what` names one of them.
+pub(crate) fn bounds_of(what: &'static str, positions: &[[f64; 3]]) -> Result<Aabb, DeformError> {
+    // NaN and infinities survive in the sum, so that one pass decides in almost all cases.
+    let (mut bounds, mut sum) = (Aabb::EMPTY, 0.0_f64);
+    for p in positions {
+        bounds.grow(*p);
+        sum += 0.0 * (p[0] + p[1] + p[2]);
+    }
+    if sum.is_finite() {
+        return Ok(bounds);
+    }
+    let is_bad = |p: &[f64; 3]| p.iter().any(|x| !x.is_finite());
+    match positions.iter().position(is_bad) {
+        Some(index) => Err(DeformError::NotFinite { what, index, position: positions[index] }),
+        // Finite coordinates whose sum overflows.
+        None => Ok(bounds),
+    }
+}

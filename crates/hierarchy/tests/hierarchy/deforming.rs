@@ -1,0 +1,234 @@
+//! A scan whose points were moved is as valid as one that was prepared: every array belongs to the
+//! current points, and enclosures hold the surface and the obstacle.
+
+use nearmiss_geometry::NodeId;
+use nearmiss_hierarchy::{
+    BuildOptions, DeformError, DeformingScan, GatherScratch, OrientedBox, Part, PointHierarchy, SLAB,
+};
+use nearmiss_surface::{Status, SurfaceOptions, project};
+use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, pose, rng};
+use nearmiss_testdata::oracle::{self, Parameters};
+
+use crate::twin::compare;
+
+/// Deformations of some points, with names.
+pub(crate) fn frames(points: &[[f64; 3]], size: f64, seed: u64) -> Vec<(&'static str, Vec<[f64; 3]>)> {
+    let rng = &mut rng(seed);
+    let turn = pose(rng, 3.0 * size);
+    let noise: Vec<[f64; 3]> = points.iter().map(|_| point_in(rng, 0.02 * size)).collect();
+    let all = |f: &dyn Fn(usize, [f64; 3]) -> [f64; 3]| {
+        points.iter().enumerate().map(|(i, p)| f(i, *p)).collect::<Vec<_>>()
+    };
+    let wave = 3.0 / size;
+    vec![
+        ("identity", points.to_vec()),
+        ("rigid", all(&|_, p| turn.apply(p))),
+        ("shear", all(&|_, [x, y, z]| [x + 0.1 * z, y - 0.05 * x, z])),
+        ("bend", all(&|_, [x, y, z]| [x, y, z + 0.1 * size * (wave * x).sin()])),
+        ("stretch", all(&|_, [x, y, z]| [1.7 * x, y, 0.8 * z])),
+        ("noise", all(&|i, p| [0, 1, 2].map(|k| p[k] + noise[i][k]))),
+        ("soup", all(&|i, _| noise[i].map(|x| 30.0 * x))),
+        ("apart", all(&|_, [x, y, z]| [if x > 0.1 * size { x + size } else { x }, y, z])),
+        ("far", all(&|_, p| [p[0] + 1e4 * size, p[1], p[2] - 3e3 * size])),
+        ("flat", all(&|_, [x, y, _]| [x, y, 0.0])),
+        ("line", all(&|_, [x, ..]| [x, 0.5 * x, 0.0])),
+        ("point", all(&|_, _| [0.25 * size; 3])),
+        ("identity", points.to_vec()),
+    ]
+}
+
+/// Points of each kind, and their extent.
+fn clouds() -> Vec<(CloudKind, Vec<[f64; 3]>, f64)> {
+    let kinds = [
+        CloudKind::Sphere,
+        CloudKind::Lattice,
+        CloudKind::Random,
+        CloudKind::Rings,
+        CloudKind::Clustered,
+        CloudKind::Outlier,
+        CloudKind::Duplicates,
+        CloudKind::Huge,
+    ];
+    let with_extent = |kind| {
+        let points = arbitrary::cloud(kind, 700, 9);
+        let far = points.iter().flatten().fold(0.0_f64, |far, x| far.max(x.abs()));
+        (kind, points, far)
+    };
+    kinds.map(with_extent).to_vec()
+}
+
+/// Returns the distance by which `x` is outside the box.
+fn outside(bounds: &OrientedBox, x: [f64; 3]) -> f64 {
+    let d = [0, 1, 2].map(|k| x[k] - f64::from(bounds.centre[k]));
+    let along = |k: usize| (0..3).map(|i| f64::from(bounds.axes[k][i]) * d[i]).sum::<f64>();
+    (0..3).map(|k| along(k).abs() - f64::from(bounds.half[k])).fold(f64::MIN, f64::max)
+}
+
+/// Asserts that places of the surface and of the obstacle are in the enclosures of all nodes that
+/// contain their nearest point. Returns their numbers.
+fn check_enclosed(scan: &PointHierarchy, seed: u64, name: &str) -> [usize; 2] {
+    let (mut scratch, mut random, mut found) = (GatherScratch::default(), rng(seed), [0; 2]);
+    let (arrays, positions) = (scan.arrays(), scan.positions());
+    let nearest = |x: [f64; 3]| scan.nearest_point(x) as usize;
+    let held = |part: Part, x: [f64; 3], p: usize| {
+        let mut node = Some(scan.topology().leaf_of(p));
+        while let Some(id) = node {
+            let beyond = outside(&scan.tree().enclosure(part, id), x);
+            assert!(
+                beyond <= 0.0,
+                "{name}: {x:?} is {beyond} outside {part:?} of node {id:?}, near point {p}"
+            );
+            node = scan.topology().parent(id).map(|(parent, _)| parent);
+        }
+    };
+    for i in 0..scan.len() {
+        let r = f64::from(scan.radii()[i]);
+        let away = point_in(&mut random, 1.5 * r);
+        let start = [0, 1, 2].map(|k| f64::from(positions[i][k]) + away[k]);
+        let foot = project(start, |x| scan.evaluate_with(x, &mut scratch));
+        for x in [start, foot.point] {
+            if scan.evaluate_with(x, &mut scratch).status != Status::Ok {
+                continue;
+            }
+            let p = nearest(x);
+            held(Part::Surface, x, p);
+            found[0] += 1;
+            let d = [0, 1, 2].map(|k| x[k] - f64::from(positions[p][k]));
+            let height: f64 = (0..3).map(|k| d[k] * f64::from(scan.normals()[p][k])).sum();
+            let far = d.iter().map(|d| d * d).sum::<f64>().sqrt();
+            let slab = f64::from(SLAB * scan.radii()[p]);
+            if arrays.is_on_sheet(p) && far <= f64::from(arrays.cell_radius(p)) && height.abs() <= slab {
+                held(Part::Obstacle, x, p);
+                found[1] += 1;
+            }
+        }
+    }
+    found
+}
+
+/// The default surface, for the naive implementation of f.
+fn parameters() -> Parameters {
+    let surface = SurfaceOptions::default();
+    Parameters {
+        reach: surface.support_radius,
+        kernel: oracle::Kernel::Gaussian { theta: 1e-4 },
+        bandwidth: oracle::Bandwidth::Local,
+        least_support: surface.support_min as usize,
+    }
+}
+
+#[test]
+fn a_moved_scan_is_valid_in_every_frame() {
+    let (mut found, mut compared) = ([0; 2], 0);
+    for (kind, points, size) in clouds() {
+        for leaf_size in [16, 10] {
+            let options = BuildOptions::default().with_leaf_size(leaf_size);
+            let Ok(mut scan) = DeformingScan::new(&points, &options) else { continue };
+            for (number, (name, frame)) in (0..).zip(frames(&points, size, 4)) {
+                let name = format!("{kind:?}, leaves of {leaf_size}, {name}");
+                let refitted = match scan.refit(&frame) {
+                    // Noise takes repeated points apart.
+                    Err(DeformError::Apart { .. }) => continue,
+                    refitted => refitted.unwrap(),
+                };
+                assert_eq!(refitted.carried + refitted.fitted, scan.len(), "{name}");
+                assert_eq!(scan.sanity_check(), Ok(()), "{name}");
+                let of_frame = check_enclosed(&scan, number, &name);
+                found = [0, 1].map(|k| found[k] + of_frame[k]);
+                if leaf_size == 16 && name.ends_with("bend") {
+                    compared += compare(&scan, parameters(), number);
+                }
+            }
+        }
+    }
+    assert!(found.iter().all(|&found| found > 20_000), "{found:?} places of surfaces and obstacles");
+    assert!(compared > 1000, "f was compared with its naive sum at {compared} places");
+}
+
+#[test]
+fn a_scan_at_rest_keeps_its_discs_and_a_renewed_one_equals_a_prepared_one() {
+    for (kind, points, size) in clouds() {
+        let Ok(mut scan) = DeformingScan::new(&points, &BuildOptions::default()) else { continue };
+        let first = PointHierarchy::clone(&scan);
+        let is_same_order = first.arrays().dense == first.len();
+        for _ in 0..2 {
+            assert_eq!(scan.refit(&points).unwrap().fitted, 0, "{kind:?}");
+            assert_eq!(scan.radii(), first.radii(), "{kind:?}");
+            for (n, m) in scan.normals().iter().zip(first.normals()) {
+                assert!((0..3).all(|k| (n[k] - m[k]).abs() < 1e-3), "{kind:?}: {n:?}, {m:?}");
+            }
+        }
+        let shear = &frames(&points, size, 4)[2].1;
+        scan.refit(shear).unwrap();
+        scan.renew(&points).unwrap();
+        assert_eq!(scan.sanity_check(), Ok(()), "{kind:?}");
+        assert_eq!(scan.source(), first.source(), "{kind:?}: the order stays");
+        if is_same_order {
+            assert_eq!(scan.radii(), first.radii(), "{kind:?}");
+            assert_eq!(scan.normals(), first.normals(), "{kind:?}");
+            assert!((0..scan.len()).all(|i| scan.kind(i) == first.kind(i)), "{kind:?}");
+            assert!(scan.discs().iter().eq(first.discs().iter()), "{kind:?}");
+            assert_eq!(scan.reach(), first.reach(), "{kind:?}");
+            assert_eq!(scan.outline().identity, first.outline().identity, "{kind:?}");
+        }
+        // Renewed in another frame, it equals one that was prepared there and kept its order.
+        scan.renew(shear).unwrap();
+        let mut other = DeformingScan::new(&points, &BuildOptions::default()).unwrap();
+        other.renew(shear).unwrap();
+        assert_eq!(scan.outline(), other.outline(), "{kind:?}: history does not matter");
+    }
+}
+
+#[test]
+fn points_are_fitted_anew_where_their_spacing_changes() {
+    let lattice = |stretch: f64| -> Vec<[f64; 3]> {
+        let place = |i: u32| [f64::from(i % 60), f64::from(i / 60)];
+        let stretched = |[x, y]: [f64; 2]| [if x > 30.0 { 30.0 + stretch * (x - 30.0) } else { x }, y, 0.0];
+        (0..3600).map(place).map(stretched).collect()
+    };
+    let mut scan = DeformingScan::new(&lattice(1.0), &BuildOptions::default()).unwrap();
+    let far = |scan: &DeformingScan| {
+        let place = scan.source().iter().position(|&i| i == 60 * 30 + 55).unwrap();
+        f64::from(scan.radii()[place]) * scan.frame().scale
+    };
+    let before = far(&scan);
+    assert_eq!(scan.refit(&lattice(1.2)).unwrap().fitted, 0, "within the factor all are carried");
+    let carried = far(&scan);
+    assert!((carried / before - 1.2).abs() < 0.01, "{carried} of {before}");
+    let refitted = scan.refit(&lattice(1.4)).unwrap();
+    assert!((1500..2200).contains(&refitted.fitted), "half of the points: {refitted:?}");
+    let fitted = far(&scan);
+    let mut anew = DeformingScan::new(&lattice(1.4), &BuildOptions::default()).unwrap();
+    assert!((fitted / far(&anew) - 1.0).abs() < 0.05, "{fitted}, prepared anew {}", far(&anew));
+    anew.refit(&lattice(1.4)).unwrap();
+    assert!((scan.sheet_share() - anew.sheet_share()).abs() < 0.01, "{}", scan.sheet_share());
+    assert_eq!(scan.refit(&lattice(1.4)).unwrap().fitted, 0, "they rest in the new frame");
+}
+
+#[test]
+fn faulty_frames_are_refused_and_change_nothing() {
+    let mut points = arbitrary::cloud(CloudKind::Sphere, 100, 1);
+    points.push(points[3]);
+    let mut scan = DeformingScan::new(&points, &BuildOptions::default()).unwrap();
+    let identity = scan.outline().identity;
+    assert_eq!(
+        scan.refit(&points[1..]),
+        Err(DeformError::Count { what: "points", expected: 101, got: 100 }),
+        "too few points"
+    );
+    let mut faulty = points.clone();
+    faulty[17][2] = f64::NAN;
+    let message = scan.refit(&faulty).unwrap_err().to_string();
+    assert!(message.contains("point 17") && message.contains("NaN"), "{message}");
+    faulty[17][2] = 1e40;
+    assert!(matches!(scan.renew(&faulty), Err(DeformError::TooFar { .. })), "too far");
+    faulty[17] = points[17];
+    faulty[100][0] += 0.5;
+    let message = scan.refit(&faulty).unwrap_err().to_string();
+    assert!(message.contains("point 100") && message.contains("point 3"), "{message}");
+    assert_eq!(scan.outline().identity, identity, "the scan is unchanged");
+    let moved: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + 1.0, p[1], p[2]]).collect();
+    assert!(scan.refit(&moved).is_ok(), "repeated points may move together");
+    assert_ne!(scan.outline().identity, identity, "another frame is another scan");
+    assert_eq!(scan.tree().bounds(NodeId::ROOT), *scan.root_box(), "one box of the root");
+}
