@@ -5,10 +5,11 @@ mod frames;
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nearmiss::Renewal;
 use serde::Serialize;
 
+pub use self::body::AnimateMethod;
 use self::body::{Asking, Body, Found, Still};
 use self::frames::Frames;
 use crate::console::{Console, Results, now};
@@ -55,18 +56,6 @@ pub struct AnimateArgs {
     /// Show no progress
     #[arg(long, help_heading = "Output")]
     pub quiet: bool,
-}
-
-/// How bounds follow a motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-#[non_exhaustive]
-pub enum AnimateMethod {
-    /// Refit, and prepare anew once that has made the bounds too loose
-    Auto,
-    /// Refit the bounds; the order of triangles or points stays
-    Refit,
-    /// Prepare every frame anew
-    Rebuild,
 }
 
 /// The JSON output of `animate`.
@@ -166,7 +155,7 @@ fn animate(
     if args.json { Ok(()) } else { results.line(summary.text()) }
 }
 
-/// What happened at all query times.
+/// The verdicts and times of all query times.
 #[derive(Debug, Default)]
 struct Summary {
     verdicts: Vec<&'static str>,

@@ -137,7 +137,7 @@ fn meshes(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<
     let [refit, rebuild, ask_refitted, ask_anew, itself] = &mut times;
     let (mut scratch, mut wrong, mut hits, mut folded) = (MeshScratch::default(), 0, 0, 0);
     let mut loosest = 1.0_f64;
-    let mut ask = |mesh: &MovingMesh, pose: &Pose, times: &mut Times, scratch: &mut MeshScratch| {
+    let ask = |mesh: &MovingMesh, pose: &Pose, times: &mut Times, scratch: &mut MeshScratch| {
         let pair = MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(pose));
         times.of(|| black_box(pair.collide(scratch)).verdict.is_intersecting())
     };

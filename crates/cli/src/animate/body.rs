@@ -1,7 +1,8 @@
-//! What moves, what it is tested against, and the test.
+//! Moving bodies, their partners, and the tests of both.
 
 use std::path::Path;
 
+use clap::ValueEnum;
 use nearmiss::io::{Pieces, read_in_pieces};
 use nearmiss::store::File;
 use nearmiss::{
@@ -10,11 +11,22 @@ use nearmiss::{
     Placed, PlacedMesh, Pose, Renewal, Scan, Scratch, TriangleMesh, Verdict,
 };
 
-use super::AnimateMethod;
 use super::frames::Frames;
 use crate::answer_report::word;
 use crate::error::CliError;
 use crate::input::{self, Opening};
+
+/// How bounds follow a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[non_exhaustive]
+pub enum AnimateMethod {
+    /// Refit, and prepare anew once that has made the bounds too loose
+    Auto,
+    /// Refit the bounds; the order of triangles or points stays
+    Refit,
+    /// Prepare every frame anew
+    Rebuild,
+}
 
 /// A mesh or a scan that moves.
 pub(super) enum Body {

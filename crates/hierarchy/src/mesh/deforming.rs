@@ -4,7 +4,9 @@ use std::ops::Deref;
 
 use nearmiss_geometry::{Aabb, Frame, TriangleMesh};
 use nearmiss_lanes::parallel::fill;
+use nearmiss_lanes::vector::{cross, dot, sub};
 
+use crate::mesh::block::LEAF_TRIANGLES;
 use crate::mesh::build::{FARTHEST, MeshHierarchy, block, build_as_given, too_far};
 use crate::mesh::options::{MeshBuildError, MeshBuildOptions};
 use crate::mesh::refit::refit;
@@ -67,7 +69,7 @@ impl DeformingMesh {
         let local = vec![[0.0; 3]; vertices.len()];
         let mesh = build_as_given(vertices, triangles, options)?;
         let mut moving = Self { mesh, options: *options, local, fresh: 0.0 };
-        moving.fresh = moving.mesh.arrays().tree.cost();
+        moving.fresh = moving.cost();
         Ok(moving)
     }
 
@@ -118,12 +120,22 @@ impl DeformingMesh {
     }
 
     /// Returns the cost of the boxes relative to that after the last build: the sum of the areas of
-    /// all boxes, in areas of the root's box (Goldsmith & Salmon 1987). 1 after a build; the greater,
+    /// all boxes, in areas of the triangles (Goldsmith & Salmon 1987). 1 after a build; the greater,
     /// the looser the boxes. O(n), a small part of a refit.
     #[must_use]
     pub fn looseness(&self) -> f64 {
-        let cost = self.mesh.arrays().tree.cost();
-        if cost.is_finite() && self.fresh.is_finite() { cost / self.fresh } else { 1.0 }
+        let looseness = self.cost() / self.fresh;
+        if looseness.is_finite() { looseness } else { 1.0 }
+    }
+
+    /// The areas of all boxes, in areas of the triangles.
+    fn cost(&self) -> f64 {
+        let corners = |i: usize| self.mesh.arrays.blocks[i / LEAF_TRIANGLES].get(i % LEAF_TRIANGLES);
+        let area = |[p, q, r]: [[f32; 3]; 3]| {
+            let normal = cross(sub(q, p), sub(r, p));
+            f64::from(dot(normal, normal).sqrt())
+        };
+        self.mesh.arrays().tree.area() / (0..self.mesh.len()).map(|i| area(corners(i))).sum::<f64>()
     }
 
     /// Checks the vertices of a frame and returns their bounds.

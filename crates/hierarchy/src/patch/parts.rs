@@ -103,9 +103,9 @@ pub(crate) fn bound_parts(
 
 /// The least and greatest coordinates of some points along three axes.
 struct Extents {
-    /// Of discs and balls.
+    /// The extents of discs and balls.
     discs: [[f32; 3]; 2],
-    /// Of cylinders about cells, and of points.
+    /// The extents of cylinders about cells, then of points.
     cells: [[f32; 3]; 2],
     points: [[f32; 3]; 2],
     /// The greatest local radius.

@@ -99,7 +99,7 @@ impl DeformingScan {
 
     fn with(scan: PointHierarchy, options: BuildOptions, given: usize, twins: Vec<[u32; 2]>) -> Self {
         let memory = Memory::at_rest(&scan);
-        let fresh = scan.tree().cost();
+        let fresh = cost(&scan);
         Self { scan, options, given, twins, memory, fresh }
     }
 
@@ -179,12 +179,12 @@ impl DeformingScan {
     }
 
     /// Returns the cost of the boxes relative to that when all points were last fitted anew: the sum
-    /// of the areas of all boxes, in areas of the root's box (Goldsmith & Salmon 1987). The greater,
-    /// the looser the boxes. O(n), a small part of a refit.
+    /// of the areas of all boxes, in squared local radii (Goldsmith & Salmon 1987). The greater, the
+    /// looser the boxes. O(n), a small part of a refit.
     #[must_use]
     pub fn looseness(&self) -> f64 {
-        let cost = self.scan.tree().cost();
-        if cost.is_finite() && self.fresh.is_finite() { cost / self.fresh } else { 1.0 }
+        let looseness = cost(&self.scan) / self.fresh;
+        if looseness.is_finite() { looseness } else { 1.0 }
     }
 
     /// Returns the share of points whose class does not suit their place in the order: sparse points
@@ -232,6 +232,11 @@ impl DeformingScan {
         let stored = |p: [f64; 3]| frame.to_world(frame.to_local(p));
         Ok((frame, Aabb { min: stored(bounds.min), max: stored(bounds.max) }))
     }
+}
+
+/// Returns the areas of all boxes, in squared local radii.
+fn cost(scan: &PointHierarchy) -> f64 {
+    scan.tree().area() / scan.radii().iter().map(|r| f64::from(r * r)).sum::<f64>()
 }
 
 /// Returns a bound of the change of a coordinate by rounding to single precision.

@@ -21,7 +21,7 @@ use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::fill_groups;
 use crate::point::spacing::{Look, spacings_of};
 use crate::scan::build::PointHierarchy;
-use crate::scan::sampling::quantile;
+use crate::scan::sampling::{quantile, set_reaches};
 use crate::tree::split::{Item, bound_in_order};
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Root, growths_of_siblings, siblings};
@@ -122,11 +122,14 @@ pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &Nex
     let spaced = if changed.is_empty() { None } else { Some(space(scan, memory, &changed)) };
     support(scan, memory);
     bound_in_order(&memory.items, &topology, &mut memory.boxes);
-    bound(scan, memory);
     if let Some(looks) = spaced {
+        // Boxes about points suffice to find neighbours.
+        set_reaches(&topology, &mut memory.boxes, &scan.arrays.radii);
+        scan.meta.root.bounds = memory.boxes[NodeId::ROOT.index()];
+        siblings(&topology, &memory.boxes, scan.arrays.siblings.to_mut());
         fit(scan, memory, &changed, &looks);
-        bound(scan, memory);
     }
+    bound(scan, memory);
     let fitted = changed.iter().map(|leaf| topology.points_of_leaf(*leaf as usize).len()).sum();
     memory.changed = changed;
     finish(scan, memory);

@@ -169,10 +169,9 @@ impl<'a> Tree<'a> {
         self.growth(part, id).of(&self.bounds(id))
     }
 
-    /// Returns the sum of the surface areas of all boxes, in areas of the root's box; NaN if that
-    /// has none. It is the cost of a traversal by the surface area heuristic (Goldsmith & Salmon
-    /// 1987) without constants. O(n).
-    pub(crate) fn cost(&self) -> f64 {
+    /// Returns an eighth of the sum of the surface areas of all boxes, to which the cost of a
+    /// traversal is proportional by the surface area heuristic (Goldsmith & Salmon 1987). O(n).
+    pub(crate) fn area(&self) -> f64 {
         let area = |[x, y, z]: [f32; 3]| {
             let [x, y, z] = [x, y, z].map(f64::from);
             x * y + y * z + z * x
@@ -181,7 +180,7 @@ impl<'a> Tree<'a> {
             let [x, y, z] = &siblings.half;
             (0..FAN).map(|lane| area([x[lane], y[lane], z[lane]])).sum::<f64>()
         };
-        1.0 + self.siblings.iter().map(of_children).sum::<f64>() / area(self.root.bounds.half)
+        area(self.root.bounds.half) + self.siblings.iter().map(of_children).sum::<f64>()
     }
 
     /// Returns the greatest local radius of the points under a node.

@@ -105,16 +105,22 @@ fn a_refitted_mesh_answers_as_one_prepared_anew() {
 
 #[test]
 fn a_mesh_that_loosens_is_prepared_anew() {
-    let first = tube(24, 40);
+    // Small triangles in a row, and in another order.
+    let row = |stride: u32| -> Vec<[f64; 3]> {
+        let places = (0..600_u32).map(|i| f64::from(i * stride % 600));
+        places.flat_map(|x| [[x, 0.0, 0.0], [x + 0.5, 0.1, 0.0], [x, 0.5, 0.2]]).collect()
+    };
+    let triangles = (0..600).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let first = TriangleMesh::new(row(1), triangles).unwrap();
     let mut moving = MovingMesh::new(&first, &MeshBuildOptions::default()).unwrap();
-    let soup = &frames(first.vertices(), 2)[6].1;
-    moving.refit(soup).unwrap();
-    let loose = moving.looseness();
-    assert!(loose > 1.5, "boxes about triangles anywhere are loose: {loose}");
-    assert_eq!(moving.move_to(soup), Ok(Renewal::Rebuilt));
+    moving.refit(&row(1)).unwrap();
+    assert!((moving.looseness() - 1.0).abs() < 1e-3, "boxes fit at first: {}", moving.looseness());
+    moving.refit(&row(241)).unwrap();
+    assert!(moving.looseness() > 3.0, "boxes about far triangles are loose: {}", moving.looseness());
+    assert_eq!(moving.move_to(&row(241)), Ok(Renewal::Rebuilt));
     assert!((moving.looseness() - 1.0).abs() < 1e-12, "{}", moving.looseness());
     assert_eq!(moving.check_contents(), Ok(()), "the mesh is valid");
-    let shear: Vec<[f64; 3]> = soup.iter().map(|[x, y, z]| [x + 0.1 * y, *y, *z]).collect();
+    let shear: Vec<[f64; 3]> = row(241).iter().map(|[x, y, z]| [x + 0.1 * y, *y, *z]).collect();
     assert_eq!(moving.move_to(&shear), Ok(Renewal::Refitted));
 }
 
