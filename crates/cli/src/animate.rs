@@ -2,6 +2,7 @@
 
 mod body;
 mod frames;
+mod kinetic;
 
 use std::path::PathBuf;
 
@@ -12,6 +13,7 @@ use serde::Serialize;
 pub use self::body::AnimateMethod;
 use self::body::{Asking, Body, Found, Still};
 use self::frames::Frames;
+use self::kinetic::KineticMeshes;
 use crate::console::{Console, Results, now};
 use crate::digits::{count, short};
 use crate::error::CliError;
@@ -62,8 +64,8 @@ pub struct AnimateArgs {
 #[derive(Debug, Serialize)]
 struct AnimateReport {
     t: f64,
-    bv_updates: usize,
-    events: usize,
+    bv_updates: u64,
+    events: u64,
     update_micros: f64,
     query_micros: f64,
     verdict: Option<&'static str>,
@@ -102,24 +104,33 @@ fn animate(
     (frames, others, still): (&Frames, Option<&Frames>, Option<&Still>),
     results: &mut Results,
 ) -> Result<(), CliError> {
-    let mut body = Body::first(frames)?;
-    let mut other = others.map(Body::first).transpose()?;
-    let mut asking = Asking::default();
-    let (mut vertices, mut summary) = (Vec::new(), Summary::default());
+    let mut summary = Summary::default();
     let last = frames.last();
     #[expect(clippy::cast_precision_loss, reason = "the last frame is found exactly")]
     let times = (0_u64..).map(|i| i as f64 / args.rate).take_while(|t| *t <= last);
+    let Some(following) = args.method.following() else {
+        let mut meshes = KineticMeshes::new(frames, others, still)?;
+        for t in times {
+            let moment = meshes.at(t)?;
+            summary.add(&moment);
+            moment.print(args.json, results)?;
+        }
+        return if args.json { Ok(()) } else { results.line(summary.text()) };
+    };
+    let mut body = Body::first(frames)?;
+    let mut other = others.map(Body::first).transpose()?;
+    let (mut asking, mut vertices) = (Asking::default(), Vec::new());
     for t in times {
-        let (mut updates, mut update_micros) = (0, 0.0);
+        let (mut bv_updates, mut rebuilt, mut update_micros) = (0, 0, 0.0);
         for (body, frames) in [(Some(&mut body), Some(frames)), (other.as_mut(), others)] {
             let (Some(body), Some(frames)) = (body, frames) else { continue };
             frames.at(t, &mut vertices);
             let start = now();
-            let renewal = pool.install(|| body.move_to(&vertices, args.method));
+            let renewal = pool.install(|| body.move_to(&vertices, following));
             let renewal = renewal.map_err(|cause| frames.fault(t, &cause))?;
             update_micros += micros_since(start);
-            updates += body.nodes();
-            summary.rebuilt += usize::from(renewal == Renewal::Rebuilt);
+            bv_updates += body.nodes() as u64;
+            rebuilt += usize::from(renewal == Renewal::Rebuilt);
         }
         let start = now();
         let found = match (&other, still) {
@@ -128,31 +139,44 @@ fn animate(
             (None, None) => asking.of_itself(&body),
         };
         let query_micros = micros_since(start);
-        summary.add(found, update_micros, query_micros);
-        if args.json {
-            let (verdict, evidence) =
-                (found.map(|found| found.verdict), found.and_then(|found| found.evidence));
-            let report = AnimateReport {
-                t,
-                bv_updates: updates,
-                events: 0,
-                update_micros,
-                query_micros,
-                verdict,
-                evidence,
-            };
-            results.json(&report)?;
-        } else {
-            let said = found.map_or("moved".to_owned(), Found::words);
-            results.line(format_args!(
-                "{} s: {said} (moved in {} µs, asked in {} µs)",
-                short(t),
-                short(update_micros),
-                short(query_micros)
-            ))?;
-        }
+        let moment = Moment { t, bv_updates, events: 0, rebuilt, update_micros, query_micros, found };
+        summary.add(&moment);
+        moment.print(args.json, results)?;
     }
     if args.json { Ok(()) } else { results.line(summary.text()) }
+}
+
+/// One query time.
+#[derive(Debug)]
+struct Moment {
+    t: f64,
+    bv_updates: u64,
+    events: u64,
+    /// The number of bodies that were prepared anew.
+    rebuilt: usize,
+    update_micros: f64,
+    query_micros: f64,
+    found: Option<Found>,
+}
+
+impl Moment {
+    fn print(&self, json: bool, results: &mut Results) -> Result<(), CliError> {
+        let Self { t, bv_updates, events, update_micros, query_micros, found, .. } = *self;
+        if json {
+            let verdict = found.map(|found| found.verdict);
+            let evidence = found.and_then(|found| found.evidence);
+            let report =
+                AnimateReport { t, bv_updates, events, update_micros, query_micros, verdict, evidence };
+            return results.json(&report);
+        }
+        let said = found.map_or("moved".to_owned(), Found::words);
+        results.line(format_args!(
+            "{} s: {said} (moved in {} µs, asked in {} µs)",
+            short(t),
+            short(update_micros),
+            short(query_micros)
+        ))
+    }
 }
 
 /// The verdicts and times of all query times.
@@ -160,15 +184,18 @@ fn animate(
 struct Summary {
     verdicts: Vec<&'static str>,
     rebuilt: usize,
+    events: u64,
     updates: Vec<f64>,
     queries: Vec<f64>,
 }
 
 impl Summary {
-    fn add(&mut self, found: Option<Found>, update_micros: f64, query_micros: f64) {
-        self.verdicts.extend(found.map(|found| found.verdict));
-        self.updates.push(update_micros);
-        self.queries.push(query_micros);
+    fn add(&mut self, moment: &Moment) {
+        self.verdicts.extend(moment.found.map(|found| found.verdict));
+        self.rebuilt += moment.rebuilt;
+        self.events += moment.events;
+        self.updates.push(moment.update_micros);
+        self.queries.push(moment.query_micros);
     }
 
     fn text(mut self) -> String {
@@ -184,8 +211,12 @@ impl Summary {
         let verdicts = if verdicts.is_empty() { "no test".to_owned() } else { verdicts.join(", ") };
         let (update, query) = (median(&mut self.updates), median(&mut self.queries));
         format!(
-            "{times}: {verdicts}; prepared anew {}; medians: moved in {} µs, asked in {} µs",
-            count(self.rebuilt as u64, "time"),
+            "{times}: {verdicts}; {}; medians: moved in {} µs, asked in {} µs",
+            if self.events > 0 {
+                count(self.events, "event")
+            } else {
+                format!("prepared anew {}", count(self.rebuilt as u64, "time"))
+            },
             short(update),
             short(query)
         )

@@ -26,6 +26,28 @@ pub enum AnimateMethod {
     Refit,
     /// Prepare every frame anew
     Rebuild,
+    /// Work only when the points that determine a box change (Zachmann & Weller 2006); two meshes
+    Kinetic,
+}
+
+/// How a mesh or a scan follows the frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Following {
+    Auto,
+    Refit,
+    Rebuild,
+}
+
+impl AnimateMethod {
+    /// Returns how each body follows the frames; `None` for kinetic trees.
+    pub(super) fn following(self) -> Option<Following> {
+        match self {
+            Self::Auto => Some(Following::Auto),
+            Self::Refit => Some(Following::Refit),
+            Self::Rebuild => Some(Following::Rebuild),
+            Self::Kinetic => None,
+        }
+    }
 }
 
 /// A mesh or a scan that moves.
@@ -54,6 +76,11 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// A verdict that exact tests of triangles gave.
+    pub(super) fn exact(verdict: &'static str) -> Self {
+        Self { verdict, evidence: Some(word(Evidence::Certified)) }
+    }
+
     /// Returns the verdict for people.
     pub(super) fn words(self) -> String {
         match self.evidence {
@@ -83,15 +110,15 @@ impl Body {
     pub(super) fn move_to(
         &mut self,
         positions: &[[f64; 3]],
-        method: AnimateMethod,
+        method: Following,
     ) -> Result<Renewal, DeformError> {
         match (self, method) {
-            (Self::Mesh(mesh), AnimateMethod::Auto) => mesh.move_to(positions),
-            (Self::Scan(scan), AnimateMethod::Auto) => scan.move_to(positions),
-            (Self::Mesh(mesh), AnimateMethod::Refit) => mesh.refit(positions).map(|()| Renewal::Refitted),
-            (Self::Scan(scan), AnimateMethod::Refit) => scan.refit(positions).map(|_| Renewal::Refitted),
-            (Self::Mesh(mesh), AnimateMethod::Rebuild) => mesh.rebuild(positions).map(|()| Renewal::Rebuilt),
-            (Self::Scan(scan), AnimateMethod::Rebuild) => scan.rebuild(positions).map(|()| Renewal::Rebuilt),
+            (Self::Mesh(mesh), Following::Auto) => mesh.move_to(positions),
+            (Self::Scan(scan), Following::Auto) => scan.move_to(positions),
+            (Self::Mesh(mesh), Following::Refit) => mesh.refit(positions).map(|()| Renewal::Refitted),
+            (Self::Scan(scan), Following::Refit) => scan.refit(positions).map(|_| Renewal::Refitted),
+            (Self::Mesh(mesh), Following::Rebuild) => mesh.rebuild(positions).map(|()| Renewal::Rebuilt),
+            (Self::Scan(scan), Following::Rebuild) => scan.rebuild(positions).map(|()| Renewal::Rebuilt),
         }
     }
 

@@ -59,10 +59,20 @@ impl Frames {
         self.positions.len()
     }
 
+    /// Returns the time of frame `i`.
+    #[expect(clippy::cast_precision_loss, clippy::unused_self, reason = "a number of files")]
+    pub(super) fn time(&self, i: usize) -> f64 {
+        i as f64
+    }
+
     /// Returns the time of the last frame.
-    #[expect(clippy::cast_precision_loss, reason = "a number of files")]
     pub(super) fn last(&self) -> f64 {
-        (self.len() - 1) as f64
+        self.time(self.len() - 1)
+    }
+
+    /// Returns the places of a vertex in all frames.
+    pub(super) fn places(&self, vertex: usize) -> Vec<[f64; 3]> {
+        self.positions.iter().map(|frame| frame[vertex]).collect()
     }
 
     /// Returns the path and the positions of the first frame.

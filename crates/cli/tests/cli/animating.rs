@@ -74,6 +74,32 @@ fn a_denting_sheet_meets_the_floor_in_the_last_frame() {
 }
 
 #[test]
+fn kinetic_trees_give_the_verdicts_of_refitting() {
+    let place = frames();
+    let by = |method: &str, partner: &[&str]| {
+        let args = [&["animate"], &MESH[..], partner, &["--method", method, "--rate", "20", "--json"]];
+        place.ok(&args.concat()).json()
+    };
+    for partner in [
+        &["--against", "floor.obj"][..],
+        &["--against-frames", "floor.obj", "floor.obj", "floor.obj", "floor.obj"],
+    ] {
+        let [kinetic, refitted] = ["kinetic", "refit"].map(|method| by(method, partner));
+        assert_eq!(verdicts(&kinetic), verdicts(&refitted), "{partner:?}");
+        assert_eq!(keys(&kinetic[0]), sorted(FIELDS));
+        let of = |told: &[Value], field: &str| -> u64 {
+            told.iter().filter_map(|line| line[field].as_u64()).sum()
+        };
+        assert!(of(&kinetic, "events") > 0, "{kinetic:?}");
+        assert!(of(&kinetic, "bv_updates") < of(&refitted, "bv_updates"), "{partner:?}");
+    }
+    let refused = [&["animate"], &SCAN[..], &["--against", "floor.obj", "--method", "kinetic"]].concat();
+    place.refused(2, &refused, &["--method kinetic", "two meshes", "points without faces", "--method refit"]);
+    let alone = [&["animate"], &MESH[..], &["--method", "kinetic"]].concat();
+    place.refused(2, &alone, &["--method kinetic", "no second mesh"]);
+}
+
+#[test]
 fn motions_without_a_partner_are_told_and_summed_up() {
     let place = frames();
     let told = place.ok(&[&["animate"], &MESH[..], &["--json"]].concat()).json();
