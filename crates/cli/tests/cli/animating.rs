@@ -110,7 +110,7 @@ fn motions_without_a_partner_are_told_and_summed_up() {
     let lines: Vec<&str> = people.results.lines().collect();
     assert_eq!(lines.len(), 8, "{lines:?}");
     assert!(lines[1].starts_with("0.5 s: separated, certified (moved in "), "{lines:?}");
-    assert!(lines[7].starts_with("7 query times: 1 intersecting, 6 separated; "), "{lines:?}");
+    assert!(lines[7].starts_with("7 query times: 2 intersecting, 5 separated; "), "{lines:?}");
 }
 
 #[test]
