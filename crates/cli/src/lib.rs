@@ -3,6 +3,7 @@
 mod bus;
 mod clash;
 mod collide;
+mod collide_args;
 mod console;
 mod convert;
 mod curve;
@@ -79,7 +80,7 @@ pub use as_mesh::AsMeshName;
 pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
 pub use clash::ClashArgs;
-pub use collide::{CollideArgs, DetailName, EvidenceName};
+pub use collide_args::{CollideArgs, DetailName, EvidenceName};
 pub use contacts::ContactArgs;
 pub use convert::ConvertArgs;
 pub use curve::CurveArgs;
