@@ -47,7 +47,7 @@ pub(crate) struct AnswerReport {
     /// The manifold, the deepest point first.
     #[serde(skip_serializing_if = "Option::is_none")]
     manifold: Option<Vec<PlaceReport>>,
-    /// What the sources count: points or triangles.
+    /// The items that the sources count: points or triangles.
     #[serde(skip)]
     items: [&'static str; 2],
 }

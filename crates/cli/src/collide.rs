@@ -1,10 +1,9 @@
 //! `collide`: tests whether two scans, or a mesh and a scan, touch, and where.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
 use nearmiss::{
     Answer, Budget, CollideOptions, Contacts, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
     Evidence, Metric, Pose, Proof, Scan, Scratch, Verdict,
@@ -13,128 +12,18 @@ use nearmiss::{
 use crate::answer_report::AnswerReport;
 use crate::as_mesh::AsMeshName;
 use crate::bodies::{Bodies, Plan, Wanted};
+use crate::collide_args::{CollideArgs, DetailName, EvidenceName};
 use crate::console::{self, Console, Results, now};
-use crate::contacts::ContactArgs;
 use crate::distance_picture::paint_apart;
 use crate::error::CliError;
 use crate::eval::KernelName;
-use crate::meaning::MeaningArgs;
 use crate::mesh::args::MeshCollideArgs;
-use crate::parse::{parse_duration, parse_radius};
-use crate::path::{PathArgs, PathLog};
+use crate::path::PathLog;
 use crate::path_entry::{PathEntry, PathVerdict};
 use crate::pose_batch::{PoseLine, answer_lines};
-use crate::posing::{self, PairArgs, PoseFile, Posed};
-use crate::preprocess::parse_threads;
-use crate::search::SearchArgs;
+use crate::posing::{self, PoseFile, Posed};
 use crate::units::SizeCheck;
-use crate::viewpoint::ViewArgs;
 use crate::{mesh, output, picture, proof};
-
-/// Options of `collide`.
-#[derive(Debug, Clone, Args)]
-pub struct CollideArgs {
-    /// The scans and their poses
-    #[command(flatten)]
-    pub pair: PairArgs,
-    /// The options for many poses
-    #[command(flatten)]
-    pub path: PathArgs,
-    /// Stop at the first contact of --poses
-    #[arg(long, requires = "poses")]
-    pub first: bool,
-    /// Distances that define the surfaces; by default those that the scans were prepared for
-    ///
-    /// Raw inputs are prepared for it. With the geodesic kernel, surfaces alone are compared
-    /// and separations are estimated.
-    #[arg(long, value_enum, conflicts_with = "thickened", help_heading = "Research", hide_short_help = true)]
-    pub kernel: Option<KernelName>,
-    /// The meaning of the scans
-    #[command(flatten)]
-    pub meaning: MeaningArgs,
-    /// Compare the triangles of these inputs instead of points
-    ///
-    /// `both` does what `mesh-collide` does. With `a` or `b`, the other input is a scan.
-    #[arg(long, value_enum, value_name = "WHICH")]
-    pub as_mesh: Option<AsMeshName>,
-    /// Report scans that come nearer than this as touching, in world units
-    #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
-    pub margin: f64,
-    /// Evidence required of a separation
-    ///
-    /// A certified separation is proven. The proof adds half to the time of a query on average, and
-    /// near contact a query takes two to three times as long. The default is certified, but
-    /// estimated with the geodesic kernel.
-    #[arg(long, value_enum, help_heading = "Budget and evidence")]
-    pub evidence: Option<EvidenceName>,
-    /// Write the proof of each certified answer as a line of JSON, for an independent check
-    #[arg(long, value_name = "FILE", conflicts_with = "thickened", help_heading = "Output")]
-    pub prove: Option<PathBuf>,
-    /// Time limit for each query, such as 200us
-    ///
-    /// The unit is ns, us, ms or s; 50us to 1ms is common. When time runs out, the answer is
-    /// undecided, with a likelihood of contact.
-    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
-    pub budget: Option<Duration>,
-    /// Work limit for each query; reproducible, unlike time
-    ///
-    /// A unit is one evaluation of f or one node pair; 500 to 10000 is common.
-    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
-    pub work: Option<u64>,
-    /// Level of detail of a contact
-    #[arg(long, value_enum, default_value_t = DetailName::Witness)]
-    pub detail: DetailName,
-    /// Find all contacts, not one
-    ///
-    /// One contact is reported for each pair of leaves that touch, or with --flat for each bracket.
-    /// Contacts are accurate to first order.
-    #[arg(long)]
-    pub all: bool,
-    /// The treatment of the contacts
-    #[command(flatten)]
-    pub contacts: ContactArgs,
-    /// The search options
-    #[command(flatten)]
-    pub search: SearchArgs,
-    /// Threads; 0 for all cores
-    ///
-    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The
-    /// answers do not depend on it.
-    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
-    pub threads: Option<usize>,
-    /// Draw both scans and the place where they touch, as PNG
-    #[arg(long, value_name = "OUT.png", conflicts_with = "poses", help_heading = "Output")]
-    pub image: Option<PathBuf>,
-    /// From where the picture is taken
-    #[command(flatten)]
-    pub view: ViewArgs,
-    /// Print one JSON object for each query
-    #[arg(long, help_heading = "Output")]
-    pub json: bool,
-    /// Show no progress
-    #[arg(long, help_heading = "Output")]
-    pub quiet: bool,
-}
-
-/// The names of the levels of detail of a contact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum DetailName {
-    /// Only its existence, to first order; fastest
-    Verdict,
-    /// A point on both surfaces, verified where possible
-    Witness,
-    /// Several well-spread points, each with a normal and a gap, for a solver
-    Manifold,
-}
-
-/// The names of the kinds of evidence of a separation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum EvidenceName {
-    /// Proven: volumes that enclose the scans are disjoint
-    Certified,
-    /// Found by an exhaustive search, without proof; faster
-    Estimated,
-}
 
 /// The bodies and settings that all queries share.
 struct Question {
@@ -284,7 +173,7 @@ struct Outputs<'a, 'p, 'c> {
 
 pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     if let Some(which) = args.as_mesh {
-        which.check_collide(args)?;
+        args.check_as_mesh(which)?;
         if which == AsMeshName::Both {
             return mesh::collide::run(&mesh_args(args));
         }

@@ -85,6 +85,21 @@ pub struct DistanceArgs {
     pub quiet: bool,
 }
 
+impl DistanceArgs {
+    /// Fails if an option was given that does not apply to meshes.
+    fn check_as_mesh(&self, which: AsMeshName) -> Result<(), CliError> {
+        let of_meshes = which == AsMeshName::Both;
+        let relative = DistanceOptions::default().relative;
+        which.refuse(&[
+            ("--kernel", of_meshes && self.kernel.is_some()),
+            ("--surface-only", of_meshes && self.meaning.surface_only),
+            ("--thickened", of_meshes && self.meaning.thickened.is_some()),
+            ("--relative", of_meshes && self.relative.to_bits() != relative.to_bits()),
+            ("--image", self.image.is_some()),
+        ])
+    }
+}
+
 /// The JSON output of `distance`.
 #[derive(Debug, Serialize)]
 struct DistanceReport {
@@ -116,7 +131,7 @@ struct Question<'a> {
 
 pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     if let Some(which) = args.as_mesh {
-        which.check_distance(args)?;
+        args.check_as_mesh(which)?;
         if which == AsMeshName::Both {
             return of_meshes(args).run();
         }

@@ -50,7 +50,7 @@ impl Deref for Mesh {
 impl PreparedMesh for Mesh {
     #[inline]
     fn at(&self, pose: &Pose) -> PlacedMesh<'_> {
-        Mesh::at(self, pose)
+        Self::at(self, pose)
     }
 }
 

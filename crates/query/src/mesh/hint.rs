@@ -1,4 +1,4 @@
-//! What queries of a pair of meshes pass on to the next one.
+//! The state that queries of a pair of meshes pass on to the next one.
 
 use crate::pair::clearance::Clearance;
 

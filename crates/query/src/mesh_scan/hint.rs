@@ -1,4 +1,4 @@
-//! What queries of a mesh and a scan pass on to the next one.
+//! The state that queries of a mesh and a scan pass on to the next one.
 
 use nearmiss_hierarchy::NodePair;
 

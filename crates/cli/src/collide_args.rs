@@ -1,0 +1,150 @@
+//! The options of `collide`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+
+use crate::as_mesh::AsMeshName;
+use crate::contacts::ContactArgs;
+use crate::error::CliError;
+use crate::eval::KernelName;
+use crate::meaning::MeaningArgs;
+use crate::parse::{parse_duration, parse_radius, parse_threads};
+use crate::path::PathArgs;
+use crate::posing::PairArgs;
+use crate::search::{MethodName, OrderName, SearchArgs};
+use crate::viewpoint::ViewArgs;
+
+/// Options of `collide`.
+#[derive(Debug, Clone, Args)]
+pub struct CollideArgs {
+    /// The scans and their poses
+    #[command(flatten)]
+    pub pair: PairArgs,
+    /// The options for many poses
+    #[command(flatten)]
+    pub path: PathArgs,
+    /// Stop at the first contact of --poses
+    #[arg(long, requires = "poses")]
+    pub first: bool,
+    /// Distances that define the surfaces; by default those that the scans were prepared for
+    ///
+    /// Raw inputs are prepared for it. With the geodesic kernel, surfaces alone are compared
+    /// and separations are estimated.
+    #[arg(long, value_enum, conflicts_with = "thickened", help_heading = "Research", hide_short_help = true)]
+    pub kernel: Option<KernelName>,
+    /// The meaning of the scans
+    #[command(flatten)]
+    pub meaning: MeaningArgs,
+    /// Compare the triangles of these inputs instead of points
+    ///
+    /// `both` does what `mesh-collide` does. With `a` or `b`, the other input is a scan.
+    #[arg(long, value_enum, value_name = "WHICH")]
+    pub as_mesh: Option<AsMeshName>,
+    /// Report scans that come nearer than this as touching, in world units
+    #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
+    pub margin: f64,
+    /// Evidence required of a separation
+    ///
+    /// A certified separation is proven. The proof adds half to the time of a query on average, and
+    /// near contact a query takes two to three times as long. The default is certified, but
+    /// estimated with the geodesic kernel.
+    #[arg(long, value_enum, help_heading = "Budget and evidence")]
+    pub evidence: Option<EvidenceName>,
+    /// Write the proof of each certified answer as a line of JSON, for an independent check
+    #[arg(long, value_name = "FILE", conflicts_with = "thickened", help_heading = "Output")]
+    pub prove: Option<PathBuf>,
+    /// Time limit for each query, such as 200us
+    ///
+    /// The unit is ns, us, ms or s; 50us to 1ms is common. When time runs out, the answer is
+    /// undecided, with a likelihood of contact.
+    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
+    pub budget: Option<Duration>,
+    /// Work limit for each query; reproducible, unlike time
+    ///
+    /// A unit is one evaluation of f or one node pair; 500 to 10000 is common.
+    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    pub work: Option<u64>,
+    /// Level of detail of a contact
+    #[arg(long, value_enum, default_value_t = DetailName::Witness)]
+    pub detail: DetailName,
+    /// Find all contacts, not one
+    ///
+    /// One contact is reported for each pair of leaves that touch, or with --flat for each bracket.
+    /// Contacts are accurate to first order.
+    #[arg(long)]
+    pub all: bool,
+    /// The treatment of the contacts
+    #[command(flatten)]
+    pub contacts: ContactArgs,
+    /// The search options
+    #[command(flatten)]
+    pub search: SearchArgs,
+    /// Threads; 0 for all cores
+    ///
+    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The
+    /// answers do not depend on it.
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
+    pub threads: Option<usize>,
+    /// Draw both scans and the place where they touch, as PNG
+    #[arg(long, value_name = "OUT.png", conflicts_with = "poses", help_heading = "Output")]
+    pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// Print one JSON object for each query
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
+    pub quiet: bool,
+}
+
+/// The names of the levels of detail of a contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DetailName {
+    /// Only its existence, to first order; fastest
+    Verdict,
+    /// A point on both surfaces, verified where possible
+    Witness,
+    /// Several well-spread points, each with a normal and a gap, for a solver
+    Manifold,
+}
+
+/// The names of the kinds of evidence of a separation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EvidenceName {
+    /// Proven: volumes that enclose the scans are disjoint
+    Certified,
+    /// Found by an exhaustive search, without proof; faster
+    Estimated,
+}
+
+impl CollideArgs {
+    /// Fails if an option was given that does not apply to meshes.
+    pub(crate) fn check_as_mesh(&self, which: AsMeshName) -> Result<(), CliError> {
+        let of_meshes = which == AsMeshName::Both;
+        let SearchArgs { order, resolution, .. } = self.search;
+        let of_papers = matches!(order, Some(OrderName::Sides | OrderName::SidesByGap));
+        which.refuse(&[
+            ("--kernel", of_meshes && self.kernel.is_some()),
+            ("--surface-only", of_meshes && self.meaning.surface_only),
+            ("--thickened", of_meshes && self.meaning.thickened.is_some()),
+            ("--margin", of_meshes && self.margin > 0.0),
+            ("--evidence", of_meshes && self.evidence.is_some()),
+            (
+                "--detail",
+                self.detail == DetailName::Manifold || of_meshes && self.detail == DetailName::Verdict,
+            ),
+            ("--order", of_papers || of_meshes && order.is_some()),
+            ("--prove", self.prove.is_some()),
+            ("--method", self.search.method != MethodName::Traversal),
+            ("--flat", self.search.flat),
+            ("--coverings", self.search.coverings),
+            ("--resolution", resolution.is_some()),
+            ("--surfels", self.search.surfels.is_some()),
+            ("--image", self.image.is_some()),
+        ])
+    }
+}
