@@ -3,24 +3,23 @@
 mod body;
 mod frames;
 mod kinetic;
+mod moment;
 
 use std::path::PathBuf;
 
-use clap::Args;
-use nearmiss::Renewal;
-use serde::Serialize;
-
 pub use self::body::AnimateMethod;
-use self::body::{Asking, Body, Found, Still};
+use self::body::{Asking, Body, Still};
 use self::frames::Frames;
 use self::kinetic::KineticMeshes;
+use self::moment::{Moment, Summary};
 use crate::console::{Console, Results, now};
-use crate::digits::{count, short};
 use crate::error::CliError;
 use crate::input::Opening;
 use crate::mesh::two_meshes::micros_since;
 use crate::parse::parse_threads;
 use crate::threads::pool;
+use clap::Args;
+use nearmiss::Renewal;
 
 /// Options of `animate`.
 #[derive(Debug, Clone, Args)]
@@ -58,18 +57,6 @@ pub struct AnimateArgs {
     /// Show no progress
     #[arg(long, help_heading = "Output")]
     pub quiet: bool,
-}
-
-/// The JSON output of `animate`.
-#[derive(Debug, Serialize)]
-struct AnimateReport {
-    t: f64,
-    bv_updates: u64,
-    events: u64,
-    update_micros: f64,
-    query_micros: f64,
-    verdict: Option<&'static str>,
-    evidence: Option<&'static str>,
 }
 
 /// The greatest number of query times.
@@ -144,89 +131,6 @@ fn animate(
         moment.print(args.json, results)?;
     }
     if args.json { Ok(()) } else { results.line(summary.text()) }
-}
-
-/// One query time.
-#[derive(Debug)]
-struct Moment {
-    t: f64,
-    bv_updates: u64,
-    events: u64,
-    /// The number of bodies that were prepared anew.
-    rebuilt: usize,
-    update_micros: f64,
-    query_micros: f64,
-    found: Option<Found>,
-}
-
-impl Moment {
-    fn print(&self, json: bool, results: &mut Results) -> Result<(), CliError> {
-        let Self { t, bv_updates, events, update_micros, query_micros, found, .. } = *self;
-        if json {
-            let verdict = found.map(|found| found.verdict);
-            let evidence = found.and_then(|found| found.evidence);
-            let report =
-                AnimateReport { t, bv_updates, events, update_micros, query_micros, verdict, evidence };
-            return results.json(&report);
-        }
-        let said = found.map_or("moved".to_owned(), Found::words);
-        results.line(format_args!(
-            "{} s: {said} (moved in {} µs, asked in {} µs)",
-            short(t),
-            short(update_micros),
-            short(query_micros)
-        ))
-    }
-}
-
-/// The verdicts and times of all query times.
-#[derive(Debug, Default)]
-struct Summary {
-    verdicts: Vec<&'static str>,
-    rebuilt: usize,
-    events: u64,
-    updates: Vec<f64>,
-    queries: Vec<f64>,
-}
-
-impl Summary {
-    fn add(&mut self, moment: &Moment) {
-        self.verdicts.extend(moment.found.map(|found| found.verdict));
-        self.rebuilt += moment.rebuilt;
-        self.events += moment.events;
-        self.updates.push(moment.update_micros);
-        self.queries.push(moment.query_micros);
-    }
-
-    fn text(mut self) -> String {
-        let times = count(self.updates.len() as u64, "query time");
-        let of = |word: &str| self.verdicts.iter().filter(|verdict| **verdict == word).count();
-        let verdicts = ["intersecting", "separated", "undecided"];
-        let verdicts: Vec<String> = verdicts
-            .map(|word| (of(word), word))
-            .into_iter()
-            .filter(|(count, _)| *count > 0)
-            .map(|(count, word)| format!("{count} {word}"))
-            .collect();
-        let verdicts = if verdicts.is_empty() { "no test".to_owned() } else { verdicts.join(", ") };
-        let (update, query) = (median(&mut self.updates), median(&mut self.queries));
-        format!(
-            "{times}: {verdicts}; {}; medians: moved in {} µs, asked in {} µs",
-            if self.events > 0 {
-                count(self.events, "event")
-            } else {
-                format!("prepared anew {}", count(self.rebuilt as u64, "time"))
-            },
-            short(update),
-            short(query)
-        )
-    }
-}
-
-/// Returns the middle value; 0 if there is none.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or_default()
 }
 
 /// Parses a number of query times a second.

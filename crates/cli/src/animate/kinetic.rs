@@ -4,9 +4,9 @@ use nearmiss::Mesh;
 use nearmiss::kinetic::{Counts, FlightPlan, KineticError, KineticTree, SeparationList};
 use nearmiss::mesh::triangles_meet;
 
-use super::Moment;
 use super::body::{Found, Still};
 use super::frames::Frames;
+use super::moment::Moment;
 use crate::console::now;
 use crate::error::CliError;
 use crate::mesh::two_meshes::micros_since;

@@ -1,0 +1,103 @@
+//! The answers at query times, and their summary.
+
+use serde::Serialize;
+
+use super::body::Found;
+use crate::console::Results;
+use crate::digits::{count, short};
+use crate::error::CliError;
+
+/// The JSON output of `animate`.
+#[derive(Debug, Serialize)]
+struct AnimateReport {
+    t: f64,
+    bv_updates: u64,
+    events: u64,
+    update_micros: f64,
+    query_micros: f64,
+    verdict: Option<&'static str>,
+    evidence: Option<&'static str>,
+}
+
+/// One query time.
+#[derive(Debug)]
+pub(super) struct Moment {
+    pub(super) t: f64,
+    pub(super) bv_updates: u64,
+    pub(super) events: u64,
+    /// The number of bodies that were prepared anew.
+    pub(super) rebuilt: usize,
+    pub(super) update_micros: f64,
+    pub(super) query_micros: f64,
+    pub(super) found: Option<Found>,
+}
+
+impl Moment {
+    pub(super) fn print(&self, json: bool, results: &mut Results) -> Result<(), CliError> {
+        let Self { t, bv_updates, events, update_micros, query_micros, found, .. } = *self;
+        if json {
+            let verdict = found.map(|found| found.verdict);
+            let evidence = found.and_then(|found| found.evidence);
+            let report =
+                AnimateReport { t, bv_updates, events, update_micros, query_micros, verdict, evidence };
+            return results.json(&report);
+        }
+        let said = found.map_or("moved".to_owned(), Found::words);
+        results.line(format_args!(
+            "{} s: {said} (moved in {} µs, asked in {} µs)",
+            short(t),
+            short(update_micros),
+            short(query_micros)
+        ))
+    }
+}
+
+/// The verdicts and times of all query times.
+#[derive(Debug, Default)]
+pub(super) struct Summary {
+    verdicts: Vec<&'static str>,
+    rebuilt: usize,
+    events: u64,
+    updates: Vec<f64>,
+    queries: Vec<f64>,
+}
+
+impl Summary {
+    pub(super) fn add(&mut self, moment: &Moment) {
+        self.verdicts.extend(moment.found.map(|found| found.verdict));
+        self.rebuilt += moment.rebuilt;
+        self.events += moment.events;
+        self.updates.push(moment.update_micros);
+        self.queries.push(moment.query_micros);
+    }
+
+    pub(super) fn text(mut self) -> String {
+        let times = count(self.updates.len() as u64, "query time");
+        let of = |word: &str| self.verdicts.iter().filter(|verdict| **verdict == word).count();
+        let verdicts = ["intersecting", "separated", "undecided"];
+        let verdicts: Vec<String> = verdicts
+            .map(|word| (of(word), word))
+            .into_iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, word)| format!("{count} {word}"))
+            .collect();
+        let verdicts = if verdicts.is_empty() { "no test".to_owned() } else { verdicts.join(", ") };
+        let (update, query) = (median(&mut self.updates), median(&mut self.queries));
+        format!(
+            "{times}: {verdicts}; {}; medians: moved in {} µs, asked in {} µs",
+            if self.events > 0 {
+                count(self.events, "event")
+            } else {
+                format!("prepared anew {}", count(self.rebuilt as u64, "time"))
+            },
+            short(update),
+            short(query)
+        )
+    }
+}
+
+/// Returns the middle value; 0 if there is none.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or_default()
+}
