@@ -97,7 +97,8 @@ impl Approach<'_, '_> {
             return None;
         }
         let (view, scratch) = (self.views[side], &mut self.gathers[side]);
-        let foot = project(x, |y| view.evaluate_near(self.samples[side], y, scratch));
+        let mut near = view.near(self.samples[side], scratch);
+        let foot = project(x, |y| near.evaluate(y));
         self.meter.evaluated(u64::from(foot.evaluations));
         Some(foot)
     }
