@@ -7,3 +7,4 @@ pub(crate) mod kind;
 pub(crate) mod leaf_block;
 pub(crate) mod neighbours;
 pub(crate) mod spacing;
+pub(crate) mod stored_point;

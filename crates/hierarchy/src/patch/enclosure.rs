@@ -28,8 +28,7 @@ use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::fill;
-use nearmiss_lanes::vector::{cross, tangents};
-use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_lanes::vector::{cross, dot, sub};
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load, product, seen_from};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::BORDER;
@@ -108,33 +107,29 @@ impl Surroundings {
         }
     }
 
-    /// Returns the cell of the point `p`: a cylinder that contains the surface points nearest to
-    /// it. The blocks `near` contain its neighbours.
+    /// Returns the greatest distance of a surface point from its nearest point.
+    pub(crate) fn reach(&self) -> f32 {
+        self.reach
+    }
+
+    /// Returns the cell of the point `p`, a cylinder that contains the surface points nearest to it,
+    /// by facts 1 and 2. The support of all blocks but those at `places` is out of its reach.
     #[inline(always)]
-    pub(crate) fn cell<'a, S: Simd>(
-        &self,
-        simd: S,
-        p: [f32; 3],
-        normal: [f32; 3],
-        radius: f32,
-        near: impl Iterator<Item = &'a PointBlock>,
-    ) -> Cell {
-        let (u, v) = tangents(normal);
+    pub(crate) fn cell<S: Simd>(&self, simd: S, p: [f32; 3], normal: [f32; 3], places: &[u32]) -> Cell {
         let reach = self.reach;
-        let (low, high) = self.heights(simd, sub(p, self.origin), normal, reach);
-        let mut cell = Cell { across: reach, low: low.max(-reach), high: high.min(reach) };
-        let frame = [u, v, normal];
-        cell.across = across(simd, p, frame, &cell, NEIGHBOURS * radius, near).min(reach);
-        cell
+        let (low, high) = self.heights(simd, sub(p, self.origin), normal, places);
+        Cell { across: reach, low: low.max(-reach), high: high.min(reach) }
     }
 
     /// Applies fact 1 along the normal of `p`: returns the least and greatest height of a surface
-    /// point within `reach` of it.
+    /// point within reach of it.
     #[inline(always)]
-    fn heights<S: Simd>(&self, simd: S, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
+    fn heights<S: Simd>(&self, simd: S, p: [f32; 3], normal: [f32; 3], places: &[u32]) -> (f32, f32) {
+        let reach = self.reach;
         let zero = f32x16::splat(simd, 0.0);
         let (mut low, mut high, mut most) = (zero, zero, zero);
-        for block in &self.blocks {
+        for &place in places {
+            let block = &self.blocks[place as usize];
             let d = seen_from(simd, &block.position, p);
             let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
             let within = support_radius + reach;
@@ -148,48 +143,64 @@ impl Surroundings {
     }
 }
 
-/// Applies fact 3: returns the maximum distance from the axis of a surface point in the cell of
-/// `p`. Of the points in the blocks `near`, those `within` some distance of `p` are used. The last
-/// of `axes` is the normal.
-#[inline(always)]
-fn across<'a, S: Simd>(
-    simd: S,
-    p: [f32; 3],
-    axes: [[f32; 3]; 3],
-    cell: &Cell,
-    within: f32,
-    near: impl Iterator<Item = &'a PointBlock>,
-) -> f32 {
-    // For each sector, the greatest reciprocal of a bound.
-    let mut closed = f32x16::splat(simd, 0.0);
-    for block in near {
-        let d = seen_from(simd, &block.position, p);
-        let d_sq = product(d, d);
-        let counts: mask32x16<S> = d_sq.simd_gt(0.0) & d_sq.simd_le(within * within);
+/// Fact 3 in the tangent plane of a point: the sectors in which its neighbours bound its cell.
+pub(crate) struct Sides<S: Simd> {
+    /// The greatest squared distance of a neighbour that bounds.
+    most_sq: f32,
+    /// For each sector, the greatest reciprocal of a bound.
+    closed: f32x16<S>,
+}
+
+impl<S: Simd> Sides<S> {
+    /// Starts without a neighbour. `radius` is the local radius of the point.
+    #[inline(always)]
+    pub(crate) fn new(simd: S, radius: f32) -> Self {
+        let within = NEIGHBOURS * radius;
+        Self { most_sq: within * within, closed: f32x16::splat(simd, 0.0) }
+    }
+
+    /// Adds the points of a block. `d_sq` are their squared distances, `x` and `y` their coordinates
+    /// in the tangent plane, and `heights` returns their heights above it. No part of `cell` is
+    /// outside its least and greatest height.
+    #[inline(always)]
+    pub(crate) fn add(
+        &mut self,
+        simd: S,
+        cell: &Cell,
+        d_sq: f32x16<S>,
+        [x, y]: [f32x16<S>; 2],
+        height: f32x16<S>,
+    ) {
+        /// The greatest reciprocal of a bound. A sum of two products of such numbers is finite, so
+        /// that minima and maxima are the same on every machine.
+        const MOST: f32 = 1e30;
+        let counts: mask32x16<S> = d_sq.simd_gt(0.0) & d_sq.simd_le(self.most_sq);
         if !counts.any_true() {
-            continue;
+            return;
         }
         // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, a neighbour q and any
         // height z.
-        let height = along(d, axes[2]);
         let bound = d_sq * 0.5 + (-(height * cell.low)).max(-(height * cell.high)).max(0.0);
-        let (x, y) = ((along(d, axes[0]) / bound).to_array(), (along(d, axes[1]) / bound).to_array());
-        let counts: mask32x16<S> = counts & bound.simd_ge(f32::MIN_POSITIVE);
+        let (x, y) = (x / bound, y / bound);
+        let counts: mask32x16<S> = counts & (x.abs() + y.abs()).simd_lt(MOST);
+        let (x, y) = (x.to_array(), y.to_array());
         let mut bits = counts.to_bitmask();
         while bits != 0 {
             let i = bits.trailing_zeros() as usize % WIDTH;
             bits &= bits - 1;
             // A bound that holds at both rays of a sector holds between them.
             let (side, next) = (rays(simd, &RAYS, x[i], y[i]), rays(simd, &NEXT_RAYS, x[i], y[i]));
-            let is_less: mask32x16<S> = side.simd_lt(next);
-            let least = simd.select_f32x16(is_less, side, next);
-            // NaN, or a zero of either sign, leaves a sector unbounded.
-            let is_more: mask32x16<S> = least.simd_gt(closed);
-            closed = simd.select_f32x16(is_more, least, closed);
+            self.closed = self.closed.max(side.min(next));
         }
     }
-    let least = least(closed, f32::INFINITY);
-    if least > 0.0 { GROWN / least } else { f32::INFINITY }
+
+    /// Narrows the cell to the bounds of its sides.
+    #[inline(always)]
+    pub(crate) fn close(self, cell: &mut Cell) {
+        let least = least(self.closed, f32::INFINITY);
+        let across = if least > 0.0 { GROWN / least } else { f32::INFINITY };
+        cell.across = across.min(cell.across);
+    }
 }
 
 /// Returns the component of a vector along each ray.

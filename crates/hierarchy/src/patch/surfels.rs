@@ -16,11 +16,11 @@ use nearmiss_lanes::parallel::{chunks, collect_into, in_order};
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
 use nearmiss_store::{Room, WorkError, Workspace};
-use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Status, symmetric_eigen};
+use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, Status, symmetric_eigen};
 
 use crate::bounds::boxes::OrientedBox;
 use crate::patch::covering::Solid;
-use crate::patch::enclosure::{Cell, LeafBounds, Surroundings};
+use crate::patch::enclosure::{Cell, LeafBounds, Sides, Surroundings};
 use crate::point::disc::PointCode;
 use crate::point::gather::{GROWN, Index};
 use crate::point::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
@@ -91,8 +91,12 @@ struct Some {
 struct LeafScratch {
     locality: Locality,
     surroundings: Surroundings,
-    /// The blocks whose support may contain a point.
+    /// The blocks near the leaf.
+    blocks: Vec<PointBlock>,
+    /// The places of the blocks whose support may contain a point.
     near: Vec<u32>,
+    /// The places of the blocks whose support may come within the reach of a point.
+    wide: Vec<u32>,
     halves: Vec<HalfBlock>,
     fits: Vec<Moments>,
 }
@@ -281,15 +285,21 @@ impl Leaf<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let LeafScratch { locality, near, halves, fits, .. } = scratch;
+                let LeafScratch { locality, blocks, near, halves, fits, .. } = scratch;
                 let middle = self.about.centre;
                 let own = self.positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
                 let own = own.fold(0.0, f32::max).sqrt();
-                index.collect_by(simd, middle, own, &mut locality.groups);
+                locality.collect_within(simd, index, middle, own * GROWN);
+                locality.gather_balls(index);
+                blocks.clear();
+                blocks.extend(locality.blocks.iter().map(|&block| index.blocks[block as usize]));
                 fits.clear();
                 for p in self.positions {
                     let x = Centre::new(p.map(f64::from));
-                    fits.push(index.moments(simd, &x, &locality.groups, near, halves));
+                    let mut sums = Neighbourhood::new(simd, index.plan, &x);
+                    let near = locality.supporting(simd, x.rounded(), 0.0, near);
+                    sums.offer_all(simd, blocks, near, halves);
+                    fits.push(sums.moments(simd));
                 }
                 Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| found(at, i));
             },
@@ -310,18 +320,28 @@ impl Leaf<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let LeafScratch { locality, surroundings, near, .. } = scratch;
+                let LeafScratch { locality, surroundings, near, wide, .. } = scratch;
                 // Radii grow by at most 0.3 per length, and few of them as fast.
                 locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
+                locality.gather_balls(index);
                 surroundings.fill(index, self.positions[0], locality);
                 let bounds = LeafBounds::new(simd, self.positions, self.about, surroundings);
                 let (mut cells, mut obstacle) = (bounds.cells(), bounds.cells());
                 let mut has_cells = false;
                 for ((p, &radius), fit) in self.positions.iter().zip(self.radii).zip(fits) {
-                    let near = index.supporting(simd, &locality.groups, *p, 0.0, near);
-                    let blocks = || near.iter().map(|&block| &index.blocks[block as usize]);
-                    let gap = widest_gap(simd, *p, fit.normal, blocks());
-                    let cell = surroundings.cell(simd, *p, fit.normal, radius, blocks());
+                    let wide = locality.supporting(simd, *p, surroundings.reach() * GROWN, wide);
+                    let mut cell = surroundings.cell(simd, *p, fit.normal, wide);
+                    let axes = tangents(fit.normal);
+                    let (mut taken, mut sides) = (Taken::new(simd), Sides::new(simd, radius));
+                    for &place in &*locality.supporting(simd, *p, 0.0, near) {
+                        let block = &index.blocks[locality.blocks[place as usize] as usize];
+                        let d = seen_from(simd, &block.position, *p);
+                        let (d_sq, flat) = (product(d, d), [along(d, axes.0), along(d, axes.1)]);
+                        taken.add(simd, block, d_sq, flat);
+                        sides.add(simd, &cell, d_sq, flat, along(d, fit.normal));
+                    }
+                    sides.close(&mut cell);
+                    let gap = taken.widest_gap();
                     cells.include(*p, fit.normal, &cell);
                     if is_dense && fit.kind().is_sheet() {
                         has_cells = true;
@@ -367,11 +387,27 @@ fn widest_gap<'a, S: Simd>(
     normal: [f32; 3],
     near: impl Iterator<Item = &'a PointBlock>,
 ) -> u32 {
-    let (u, v) = tangents(normal);
-    let mut taken = i32x16::splat(simd, 0);
+    let (axes, mut taken) = (tangents(normal), Taken::new(simd));
     for block in near {
         let d = seen_from(simd, &block.position, p);
-        let (x, y) = (along(d, u), along(d, v));
+        taken.add(simd, block, product(d, d), [along(d, axes.0), along(d, axes.1)]);
+    }
+    taken.widest_gap()
+}
+
+/// The sectors of the tangent plane of a point with points that support it, as bits, in lanes.
+struct Taken<S: Simd>(i32x16<S>);
+
+impl<S: Simd> Taken<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        Self(i32x16::splat(simd, 0))
+    }
+
+    /// Adds the points of a block that have the point within their support radius. `d_sq` are their
+    /// squared distances from it, `x` and `y` their coordinates in its tangent plane.
+    #[inline(always)]
+    fn add(&mut self, simd: S, block: &PointBlock, d_sq: f32x16<S>, [x, y]: [f32x16<S>; 2]) {
         let length = x.abs() + y.abs();
         // The angle on the diamond |x| + |y| = 1, from 0 to 4, one for each quarter turn, without
         // trigonometry.
@@ -380,20 +416,24 @@ fn widest_gap<'a, S: Simd>(
         let turn = quarter * (SECTORS as f32 / 4.0);
         let sector = simd.select_f32x16(turn.simd_lt(SECTORS as f32), turn, f32x16::splat(simd, 0.0));
         let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
-        let counts: mask32x16<S> =
-            product(d, d).simd_lt(support_radius * support_radius) & length.simd_gt(0.0);
-        taken |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
+        let counts: mask32x16<S> = d_sq.simd_lt(support_radius * support_radius) & length.simd_gt(0.0);
+        self.0 |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
     }
-    let taken = taken.to_array().into_iter().fold(0, |all, bits| all | u64::from(bits.cast_unsigned()));
-    // Repeated, so that a run across the start counts whole.
-    let round = taken | taken << SECTORS;
-    // After k steps a bit remains for each run longer than k.
-    let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
-    while runs != 0 {
-        runs &= runs >> 1;
-        widest += 1;
+
+    /// Returns the greatest number of adjacent sectors without a point.
+    #[inline(always)]
+    fn widest_gap(self) -> u32 {
+        let taken = self.0.to_array().into_iter().fold(0, |all, bits| all | u64::from(bits.cast_unsigned()));
+        // Repeated, so that a run across the start counts whole.
+        let round = taken | taken << SECTORS;
+        // After k steps a bit remains for each run longer than k.
+        let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
+        while runs != 0 {
+            runs &= runs >> 1;
+            widest += 1;
+        }
+        widest.min(SECTORS)
     }
-    widest.min(SECTORS)
 }
 
 /// Returns the bit of each number from 0 to 30, rounded down: the power of two, made as a

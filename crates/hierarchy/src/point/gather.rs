@@ -11,7 +11,7 @@ use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::vector::{dot, sub};
-use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, SurfacePlan};
+use nearmiss_surface::{Centre, Evaluation, HalfBlock, Neighbourhood, SurfacePlan};
 
 use crate::descent::PlaceVisitor;
 use crate::tree::wide::{Siblings, Tree};
@@ -91,20 +91,52 @@ impl<'a> Index<'a> {
     /// Evaluates f at `x`.
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
-        let place = centre.rounded();
-        let GatherScratch { level, block, found, supporting, halves } = scratch;
-        let mut list = self.list(*block, place, 0.0);
+        let count = self.list_supporting(centre.rounded(), 0.0, scratch);
+        self.evaluate_by(x, &centre, count, scratch)
+    }
+
+    /// Lists the blocks whose support may come within `distance` of `place` in `scratch`. Returns
+    /// their number.
+    #[inline]
+    pub(crate) fn list_supporting(
+        &self,
+        place: [f32; 3],
+        distance: f32,
+        scratch: &mut GatherScratch,
+    ) -> usize {
+        let GatherScratch { level, block, found, supporting, .. } = scratch;
+        let mut list = self.list(*block, place, distance);
         if list.is_none() {
             *block = self.nearest_block(*level, place);
-            list = self.list(*block, place, 0.0);
+            list = self.list(*block, place, distance);
         }
         let list = list.unwrap_or_else(|| {
-            self.collect(*level, place, 0.0, found);
+            self.collect(*level, place, distance, found);
             &*found
         });
         dispatch!(*level, simd => simd.vectorize(
             #[inline(always)]
-            || self.moments(simd, &centre, list, supporting, halves).evaluate(self.plan, x),
+            || self.supporting(simd, list, place, distance, supporting).len(),
+        ))
+    }
+
+    /// Evaluates f at `x`, which is `centre`, from the first `count` blocks listed in `scratch`.
+    #[inline]
+    pub(crate) fn evaluate_by(
+        &self,
+        x: [f64; 3],
+        centre: &Centre,
+        count: usize,
+        scratch: &mut GatherScratch,
+    ) -> Evaluation {
+        let GatherScratch { level, supporting, halves, .. } = scratch;
+        dispatch!(*level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut near = Neighbourhood::new(simd, self.plan, centre);
+                near.offer_all(simd, self.blocks, &supporting[..count], halves);
+                near.moments(simd).evaluate(self.plan, x)
+            },
         ))
     }
 
@@ -196,22 +228,6 @@ impl<'a> Index<'a> {
             }
         }
         &mut supporting[..count]
-    }
-
-    /// Returns the sums over all points of `groups`, which must ascend, around x.
-    #[inline(always)]
-    pub(crate) fn moments<S: Simd>(
-        &self,
-        simd: S,
-        x: &Centre,
-        groups: &[u32],
-        supporting: &mut Vec<u32>,
-        halves: &mut Vec<HalfBlock>,
-    ) -> Moments {
-        let mut near = Neighbourhood::new(simd, self.plan, x);
-        let supporting = self.supporting(simd, groups, x.rounded(), 0.0, supporting);
-        near.offer_all(simd, self.blocks, supporting, halves);
-        near.moments(simd)
     }
 }
 

@@ -13,6 +13,7 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{fill, in_order};
 use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_lanes::wide::{greatest, product, seen_from};
@@ -136,6 +137,8 @@ pub(crate) struct Locality {
     pub(crate) groups: Vec<u32>,
     /// The blocks of these groups with support near the points, ascending.
     pub(crate) blocks: Vec<u32>,
+    /// The balls around these blocks and their support, side by side.
+    balls: Vec<PointBlock>,
     /// The supports of all other blocks are further than this from the centre.
     pub(crate) within: f32,
     /// No surface point is further than this from its nearest point, if that is one of the points.
@@ -159,16 +162,70 @@ impl Locality {
         let mut half = 0.5 * index.plan.support_radius(guess);
         // A good guess saves a second descent.
         loop {
-            self.within = (own + half) * GROWN;
-            index.collect_by(simd, middle, self.within, &mut self.groups);
-            let count = index.supporting(simd, &self.groups, middle, self.within, &mut self.blocks).len();
-            self.blocks.truncate(count);
+            self.collect_within(simd, index, middle, (own + half) * GROWN);
             self.reach = 0.5 * self.greatest_support_radius(index, middle, own * GROWN);
             if self.reach <= half {
                 return;
             }
             half = self.reach;
         }
+    }
+
+    /// Collects all blocks with support within a distance of `middle`.
+    #[inline(always)]
+    pub(crate) fn collect_within<S: Simd>(
+        &mut self,
+        simd: S,
+        index: &Index<'_>,
+        middle: [f32; 3],
+        within: f32,
+    ) {
+        self.within = within;
+        index.collect_by(simd, middle, within, &mut self.groups);
+        let count = index.supporting(simd, &self.groups, middle, within, &mut self.blocks).len();
+        self.blocks.truncate(count);
+    }
+
+    /// Gathers the balls around the blocks, for [`Self::supporting`].
+    #[inline(always)]
+    pub(crate) fn gather_balls(&mut self, index: &Index<'_>) {
+        const WIDTH: usize = PointBlock::WIDTH;
+        self.balls.clear();
+        self.balls.resize(self.blocks.len().div_ceil(WIDTH), PointBlock::EMPTY);
+        for (i, &block) in self.blocks.iter().enumerate() {
+            let (balls, lane) = (&mut self.balls[i / WIDTH], i % WIDTH);
+            let (group, of_block) = (&index.groups[block as usize / WIDTH], block as usize % WIDTH);
+            for k in 0..3 {
+                balls.position[k][lane] = group.position[k][of_block];
+            }
+            balls.support_radius[lane] = group.support_radius[of_block];
+        }
+    }
+
+    /// Finds those of the blocks whose support may come within `distance` of `x`. Writes their
+    /// places in `self.blocks` to the front of `places`, ascending, and returns that part. There
+    /// are fewer of them than in the groups, which makes this faster than [`Index::supporting`].
+    #[inline(always)]
+    pub(crate) fn supporting<'p, S: Simd>(
+        &self,
+        simd: S,
+        x: [f32; 3],
+        distance: f32,
+        places: &'p mut Vec<u32>,
+    ) -> &'p mut [u32] {
+        const WIDTH: usize = PointBlock::WIDTH;
+        let most = (self.balls.len() + 1) * WIDTH;
+        if places.len() < most {
+            places.resize(most, 0);
+        }
+        let (places, mut count, mut first) = (&mut places[..most], 0, 0);
+        for balls in &self.balls {
+            if let Some(room) = places.get_mut(count..).and_then(<[u32]>::first_chunk_mut) {
+                count += balls.supporting(simd, x, distance, first, room);
+            }
+            first += id32(WIDTH);
+        }
+        &mut places[..count]
     }
 
     /// Returns the greatest support radius of the points whose support ball comes within `distance`

@@ -14,8 +14,9 @@ use xxhash_rust::xxh3::Xxh3;
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
 use crate::point::disc::DiscRadii;
-use crate::point::kind::PointKind;
+use crate::point::kind::{PointKind, is_on_sheet, obstacle_ball};
 use crate::point::leaf_block::{LeafBlock, LeafParts, Leaves};
+use crate::point::stored_point::StoredPoint;
 use crate::scan::arrays::ScanArrays;
 use crate::scan::data::{Arrays, HierarchyMeta};
 use crate::scan::options::{BuildError, BuildOptions};
@@ -76,11 +77,7 @@ impl PointHierarchy {
             radii: &self.arrays.radii,
             discs: self.discs(),
             tree: self.tree(),
-            leaves: Leaves {
-                topology: &self.topology,
-                blocks: &self.arrays.leaf_blocks,
-                marks: &self.arrays.marks,
-            },
+            leaves: self.leaves(),
             outline: &self.meta.outline,
             blocks: &self.arrays.blocks,
             sample_lists: &self.arrays.sample_lists,
@@ -275,6 +272,7 @@ impl PointHierarchy {
     }
 
     /// Returns the radii of the points' tangent discs.
+    #[inline]
     #[must_use]
     pub fn discs(&self) -> DiscRadii<'_> {
         DiscRadii {
@@ -325,7 +323,36 @@ impl PointHierarchy {
         PointId(self.arrays.source[i])
     }
 
+    /// Returns the leaves.
+    #[inline]
+    #[must_use]
+    pub fn leaves(&self) -> Leaves<'_> {
+        let (blocks, marks) = (&self.arrays.leaf_blocks, &self.arrays.marks);
+        Leaves { topology: &self.topology, blocks, marks }
+    }
+
+    /// Returns the `i`-th stored point.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn stored_point(&self, i: usize) -> StoredPoint {
+        let (kind, radius) = (self.kind(i), self.arrays.radii[i]);
+        let dense = self.meta.dense as usize;
+        StoredPoint {
+            position: PointBlock::position_in(&self.arrays.blocks, i),
+            normal: self.arrays.normals[i],
+            kind,
+            radius,
+            disc: self.arrays.codes[i].disc(radius, self.meta.reach, self.meta.sampling_radius),
+            ball: obstacle_ball(i, dense, kind, radius),
+            is_on_sheet: is_on_sheet(i, dense, kind),
+        }
+    }
+
     /// Returns the nodes and their bounding boxes.
+    #[inline]
     #[must_use]
     pub fn tree(&self) -> Tree<'_> {
         let (surface, obstacle) = (&self.arrays.surface_growths, &self.arrays.obstacle_growths);

@@ -1,10 +1,52 @@
 //! Evaluation of f, and the nearest stored point.
 
 use nearmiss_index::PointBlock;
+use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_surface::{Centre, Evaluation};
 
-use crate::point::gather::{GROUP, GatherScratch, Index};
+use crate::point::gather::{GROUP, GROWN, GatherScratch, Index};
 use crate::scan::build::PointHierarchy;
+
+/// The distance, in local radii, up to which positions share the blocks that support them. Steps
+/// onto a surface are seldom longer; with this distance about a tenth more blocks are compared.
+const SHARED: f32 = 0.25;
+
+/// The implicit function near a stored point, for several positions. Returned by
+/// [`PointHierarchy::near`].
+#[derive(Debug)]
+pub struct NearField<'a> {
+    index: Index<'a>,
+    /// The supporting blocks are the first `count` in its list.
+    scratch: &'a mut GatherScratch,
+    margin: f32,
+    /// Blocks that support positions within a distance of `centre` are listed.
+    centre: [f32; 3],
+    within: f32,
+    count: usize,
+}
+
+impl NearField<'_> {
+    /// Evaluates f at `x`, in the stored frame. Equals [`PointHierarchy::evaluate_with`].
+    pub fn evaluate(&mut self, x: [f64; 3]) -> Evaluation {
+        let centre = Centre::new(x);
+        let d = sub(centre.rounded(), self.centre);
+        let is_listed = dot(d, d) <= self.within * self.within && self.within >= 0.0;
+        if !is_listed {
+            self.list(centre.rounded());
+        }
+        self.index.evaluate_by(x, &centre, self.count, self.scratch)
+    }
+
+    /// Lists the blocks that support positions near `place`.
+    fn list(&mut self, place: [f32; 3]) {
+        let distance = [self.margin, 0.0]
+            .into_iter()
+            .find(|&distance| self.index.list(self.scratch.block, place, distance * GROWN).is_some());
+        let distance = distance.unwrap_or(0.0);
+        self.count = self.index.list_supporting(place, distance * GROWN, self.scratch);
+        (self.centre, self.within) = (place, distance);
+    }
+}
 
 impl PointHierarchy {
     /// Evaluates f at `x`, in the stored frame.
@@ -17,6 +59,14 @@ impl PointHierarchy {
     pub fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         scratch.block = i / PointBlock::WIDTH;
         self.index().evaluate(x, scratch)
+    }
+
+    /// Returns f for several positions near the stored point `i`, that is within about a local
+    /// radius of it. If there is no such point, evaluations are slower.
+    pub fn near<'a>(&'a self, i: usize, scratch: &'a mut GatherScratch) -> NearField<'a> {
+        scratch.block = i / PointBlock::WIDTH;
+        let margin = SHARED * self.arrays.radii.get(i).copied().unwrap_or(0.0);
+        NearField { index: self.index(), scratch, margin, centre: [0.0; 3], within: -1.0, count: 0 }
     }
 
     /// Like [`Self::evaluate_with`], but faster for a sequence of nearby positions along the

@@ -198,10 +198,22 @@ fn lists_and_instructions_change_no_bit() {
             let mut rng = arbitrary::rng(6);
             for i in (0..scan.len()).step_by(97) {
                 listed += usize::from(scan.neighbours(i / PointBlock::WIDTH).is_some());
+                let mut step = |reach: f64| {
+                    let offset = arbitrary::point_in(&mut rng, reach * f64::from(scan.radii()[i]));
+                    [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + offset[k])
+                };
+                // Some of these positions share a list of blocks.
+                let walk = [0.3, 0.1, 0.1, 0.2, 3.0, 0.05, 0.05, 40.0, 0.0].map(&mut step);
+                let walk = walk.map(|x| (x, by_all_points(&scan, x)));
+                for scratch in &mut scratches {
+                    let mut near = scan.near(i, scratch);
+                    for (x, expected) in walk {
+                        assert_eq!(near.evaluate(x), expected, "near a point, at {x:?}");
+                    }
+                }
                 // On the surface, near it, beyond the range of the list, and far away.
                 for reach in [0.0, 0.5, 2.0, 6.0, 40.0] {
-                    let offset = arbitrary::point_in(&mut rng, reach * f64::from(scan.radii()[i]));
-                    let x = [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + offset[k]);
+                    let x = step(reach);
                     let expected = by_all_points(&scan, x);
                     for scratch in &mut scratches {
                         // The block left in the scratch by the previous evaluation may be near or

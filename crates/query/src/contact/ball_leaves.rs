@@ -69,7 +69,9 @@ impl Surfaces<'_> {
         for lane in Bits(near) {
             let pair = points(lane);
             self.pair.meter.leaf_work(1);
-            let Some((contact, evidence)) = self.pair.ball_contact(pair, self.margin) else { continue };
+            let Some((contact, evidence)) = self.pair.single(pair).ball_contact(self.margin) else {
+                continue;
+            };
             self.tries += 1;
             self.met.get_or_insert(pair);
             let certified = match evidence {
@@ -96,7 +98,8 @@ impl Surfaces<'_> {
         let (side, k) = if ra > 0.0 { (1, j) } else { (0, i) };
         let centre = [self.pair.views[0].point(i), self.pair.views[1].point(j)][1 - side];
         let (view, scratch) = (self.pair.views[side], &mut self.gathers[side]);
-        let foot = project(centre, |y| view.evaluate_near(k, y, scratch));
+        let mut near = view.near(k, scratch);
+        let foot = project(centre, |y| near.evaluate(y));
         self.pair.meter.evaluated(u64::from(foot.evaluations));
         let apart = (Vector3::from(foot.point) - Vector3::from(centre)).norm();
         let holds = foot.converged && apart <= ra + rb + self.margin && view.is_obstacle(k, foot.point);

@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor};
 
 use crate::ask::answer::Contact;
@@ -39,7 +38,7 @@ impl<'a> Balls<'a> {
             self.apart = distance;
             return ControlFlow::Continue(());
         }
-        let contact = contact(&self.pair, points);
+        let contact = self.pair.single(points).midpoint();
         self.found.get_or_insert((contact, points));
         let Some(all) = &mut self.all else { return ControlFlow::Break(()) };
         all.push(contact);
@@ -70,20 +69,4 @@ impl BoxVisitor for Balls<'_> {
             f64::from(least - self.pair.relative.slack()) * self.pair.views[0].stored_to_world().scale();
         self.apart = self.apart.min(bound);
     }
-}
-
-/// The contact of two points.
-fn contact(pair: &ScanPair<'_>, [i, j]: [usize; 2]) -> Contact {
-    let [p, q] = [pair.views[0].point(i), pair.views[1].point(j)].map(Vector3::from);
-    Contact {
-        point: (0.5 * (p + q)).into(),
-        normals: None,
-        residual: 0.5 * (p - q).norm(),
-        sources: [pair.views[0].scan().id(i), pair.views[1].scan().id(j)],
-    }
-}
-
-/// Returns the contact of two points if they are within `reach` of each other in the world.
-pub(crate) fn balls_meet(pair: &ScanPair<'_>, reach: f64, points: [usize; 2]) -> Option<Contact> {
-    (pair.point_pair(points).distance <= reach).then(|| contact(pair, points))
 }

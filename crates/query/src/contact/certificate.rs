@@ -376,12 +376,14 @@ impl<P: Pairing> BoundVisitor<f32> for Tightening<'_, '_, P> {
     #[inline]
     fn may_split(&mut self, above: &Open, pairs: &Pairs, gaps: &Gaps) -> bool {
         let Proving { relative_pose, pair, .. } = &*self.proving;
-        let slack = pair.slack();
-        let shows_less = |lane: usize| {
-            gaps.near >> lane & 1 != 0 && relative_pose.gap(gaps.enclosures[lane], slack) <= above.key
-        };
+        // The gap increases with the bound, so the least of them tells.
+        let mut least = f32::INFINITY;
+        for lane in 0..LANES {
+            let bound = gaps.enclosures[lane];
+            least = if gaps.near >> lane & 1 != 0 && bound < least { bound } else { least };
+        }
         self.last = Some(*above);
-        self.is_over = (0..LANES).any(shows_less);
+        self.is_over = gaps.near != 0 && relative_pose.gap(least, pair.slack()) <= above.key;
         self.proving.is_cut |= !self.is_over && gaps.near != pairs.lanes;
         !self.is_over
     }

@@ -11,19 +11,21 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 use nearmiss_geometry::Pose;
-use nearmiss_hierarchy::{Heap, NodePair, Plunging, Stack, descend};
+use nearmiss_hierarchy::{Heap, NodePair, Plunging, Relative, Stack, descend};
 
-use crate::ask::answer::{Answer, Contact, Contacts, Evidence, ManifoldPoint, Reason, Statistics, Verdict};
+use crate::ask::answer::{Answer, Contacts, Evidence, ManifoldPoint, Reason, Statistics, Verdict};
 use crate::ask::budget::Budget;
 use crate::ask::options::{CollideOptions, CollidePlan, Detail, Order, Semantics};
-use crate::contact::balls::{Balls, balls_meet};
+use crate::contact::balls::Balls;
 use crate::contact::certificate::{Bound, Certifier, Proof, ProofScratch};
 use crate::contact::hint::{Known, PairHint};
 use crate::contact::manifold::{self, ManifoldScratch};
 use crate::contact::search::{Closer, Plain, Surfaces, Workspace};
+use crate::leaf::point_pair::PointPair;
 use crate::pair::likelihood::likelihood;
 use crate::pair::meter::Meter;
 use crate::pair::placed::{Placed, ViewScratch};
+use crate::pair::placed_balls::relative_pose;
 use crate::pair::scan_pair::{ScanPair, relative};
 
 /// A collision question about two scans.
@@ -122,6 +124,11 @@ pub(crate) fn collide_by<'q>(
     }
     let Asked { scans: [a, b], plan, budget } = asked;
     let options = plan.options();
+    let hint = outputs.hint.as_deref_mut().filter(|_| outputs.contacts.is_none());
+    let met = hint.and_then(|hint| still_met(asked, hint));
+    if let (Some(answer), None) = (met, &outputs.manifold) {
+        return answer;
+    }
     let meter = Meter::new(budget, [a, b], evaluations);
     let (pose, relative) = match relative(a, b, plan) {
         Ok(relative_pose) => relative_pose,
@@ -131,7 +138,7 @@ pub(crate) fn collide_by<'q>(
     let arrays = [a.scan().arrays(), b.scan().arrays()];
     let pair = ScanPair::new([a, b], arrays.each_ref(), relative, meter, by);
     let manifold = outputs.manifold.take();
-    let answer = decide(pair, &pose, asked, scratch, outputs, look);
+    let answer = met.unwrap_or_else(|| decide(pair, &pose, asked, scratch, outputs, look));
     match (answer.verdict, manifold) {
         (Verdict::Intersecting { contact, .. }, Some(points)) => {
             let meter = Meter::new(budget, [a, b], evaluations).after(answer.statistics);
@@ -177,15 +184,8 @@ fn decide(
     look: impl FnOnce(&mut Surfaces<'_>, &mut Frontiers) -> ControlFlow<()>,
 ) -> Answer {
     let (plan, options) = (asked.plan, asked.plan.options());
-    let mut known = outputs.hint.map(|hint| hint.recall(&pair, options));
+    let mut known = outputs.hint.map(|hint| hint.recall(pair.views, options));
     let early = known.as_mut().and_then(|known| {
-        if outputs.contacts.is_none()
-            && let Some(met) = known.met()
-            && let Some((contact, evidence)) = still_meet(&pair, plan, met)
-        {
-            known.still_met(*pose);
-            return Some((Verdict::Intersecting { contact, evidence }, pair.band(met)));
-        }
         known.come_to(*pose, &pair);
         // A distance known from earlier poses has no list of node pairs to prove it.
         let distance = known.distance(&pair, plan.reach()).filter(|_| outputs.proof.is_none())?;
@@ -206,17 +206,29 @@ fn decide(
     }
 }
 
-/// Tests whether the points of the last contact still show a contact.
-fn still_meet(pair: &ScanPair<'_>, plan: &CollidePlan, [i, j]: [usize; 2]) -> Option<(Contact, Evidence)> {
-    match plan.options().semantics {
+/// Returns the answer if the points that met in the last query still show a contact. Reads nothing
+/// but these two points.
+fn still_met(asked: Asked<'_>, hint: &mut PairHint) -> Option<Answer> {
+    let Asked { scans, plan, .. } = asked;
+    let options = plan.options();
+    let (known, met) = hint.met(scans, options)?;
+    let pose = relative_pose(scans.map(Placed::stored_to_world))?;
+    let pair = PointPair::new(scans, met);
+    let (contact, evidence) = match options.semantics {
         Semantics::Thickened(_) => {
-            balls_meet(pair, plan.reach(), [i, j]).map(|contact| (contact, Evidence::Certified))
+            (pair.distance() <= plan.reach()).then(|| (pair.midpoint(), Evidence::Certified))
         }
-        Semantics::Obstacle if !pair.are_sheets([i, j]) => pair.ball_contact([i, j], plan.reach()),
+        Semantics::Obstacle if !pair.are_sheets() => pair.ball_contact(plan.reach()),
         // A witness needs its own search.
-        _ if plan.options().detail == Detail::Witness => None,
-        _ => pair.crosses([i, j]).then(|| (pair.shared_chord(i, j), Evidence::Estimated)),
-    }
+        _ if options.detail == Detail::Witness => None,
+        // The slack of the pose plays no part in the test.
+        _ => pair
+            .cross(&Relative::new(&pose, 0.0), options.semantics.part())
+            .then(|| (pair.shared_chord(), Evidence::Estimated)),
+    }?;
+    known.still_met(pose);
+    let verdict = Verdict::Intersecting { contact, evidence };
+    Some(Answer { verdict, band: pair.band(), distance_estimate: None, statistics: Statistics::default() })
 }
 
 /// Compares pairs of tangent discs, and then pairs of enclosures if the discs show no contact and a

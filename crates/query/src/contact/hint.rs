@@ -18,6 +18,7 @@ use crate::contact::certificate::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::contact::search::{Closer, Surfaces};
 use crate::pair::clearance::motion;
 use crate::pair::pairing::Pairing;
+use crate::pair::placed::Placed;
 use crate::pair::scan_pair::ScanPair;
 
 /// A frontier that has grown to this many times its fresh length is dropped: its nodes are smaller
@@ -58,6 +59,29 @@ struct Question {
     scale: f64,
 }
 
+impl Question {
+    fn new(views: [&Placed<'_>; 2], options: &CollideOptions) -> Self {
+        Self {
+            options: *options,
+            scans: views.map(|view| (view.scan().outline().identity, *view.scan().topology())),
+            scale: views[0].stored_to_world().scale(),
+        }
+    }
+
+    /// Returns `true` if this is the question about `views`.
+    fn is(&self, views: [&Placed<'_>; 2], options: &CollideOptions) -> bool {
+        let is_of = |side: usize| {
+            let (identity, topology) = &self.scans[side];
+            let scan = views[side].scan();
+            *identity == scan.outline().identity && topology == scan.topology()
+        };
+        is_of(0)
+            && is_of(1)
+            && self.scale.to_bits() == views[0].stored_to_world().scale().to_bits()
+            && self.options == *options
+    }
+}
+
 /// A node pair that is disjoint until b's travel reaches `until`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FrontierPair {
@@ -94,17 +118,20 @@ pub(crate) struct Known {
 impl PairHint {
     /// Returns the knowledge about this question, not yet updated to its pose; see
     /// [`Known::come_to`].
-    pub(crate) fn recall(&mut self, pair: &ScanPair<'_>, options: &CollideOptions) -> &mut Known {
-        let question = Question {
-            options: *options,
-            scans: pair.views.map(|view| (view.scan().outline().identity, *view.scan().topology())),
-            scale: pair.views[0].stored_to_world().scale(),
-        };
-        match &mut self.known {
-            Some(known) if known.question == question => {}
-            known => *known = Some(Known::nothing(question)),
-        }
-        self.known.get_or_insert_with(|| Known::nothing(question))
+    pub(crate) fn recall(&mut self, views: [&Placed<'_>; 2], options: &CollideOptions) -> &mut Known {
+        self.known.take_if(|known| !known.question.is(views, options));
+        self.known.get_or_insert_with(|| Known::nothing(Question::new(views, options)))
+    }
+
+    /// Returns the knowledge about this question and the points that met in the last query, if any.
+    pub(crate) fn met(
+        &mut self,
+        views: [&Placed<'_>; 2],
+        options: &CollideOptions,
+    ) -> Option<(&mut Known, [usize; 2])> {
+        let known = self.known.as_mut()?;
+        let met = known.met()?;
+        known.question.is(views, options).then_some((known, met))
     }
 }
 

@@ -124,7 +124,8 @@ impl Surfaces<'_> {
         let mut evaluations = 0;
         let mut land = |side: usize, x: Vector3<f64>| {
             let scratch = &mut self.gathers[side];
-            let foot = project(x.into(), |y| views[side].evaluate_near([i, j][side], y, scratch));
+            let mut near = views[side].near([i, j][side], scratch);
+            let foot = project(x.into(), |y| near.evaluate(y));
             evaluations += u64::from(foot.evaluations);
             foot
         };

@@ -117,7 +117,7 @@ impl<'a> Surfaces<'a> {
 
     /// Handles crossing discs of two leaves, those of points `i` and `j` first.
     pub(crate) fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
-        let contact = self.pair.shared_chord(i, j);
+        let contact = self.pair.single([i, j]).shared_chord();
         self.hit(contact, i, j)
     }
 
@@ -170,12 +170,13 @@ impl<'a> Surfaces<'a> {
         let radius = f64::from(self.pair.a.radii[i]).max(f64::from(self.pair.b.radii[j]) * scale);
         let start = contact.point;
         let meter = &mut self.pair.meter;
+        let (mut near_a, mut near_b) = (va.near(i, scratch_a), vb.near(j, scratch_b));
         let meeting = meet(start, |x| {
             if meter.go_on().is_break() {
                 return None;
             }
             meter.evaluated(2);
-            Some([va.evaluate_near(i, x, scratch_a), vb.evaluate_near(j, x, scratch_b)])
+            Some([near_a.evaluate(x), near_b.evaluate(x)])
         })?;
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
         let nearby = NEARBY * radius * va.stored_to_world().scale();

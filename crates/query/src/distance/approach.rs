@@ -110,7 +110,8 @@ pub(crate) fn land(
         if meter.go_on().is_break() {
             return None;
         }
-        let foot = project(x, |y| view.evaluate_near(sample, y, scratch));
+        let mut near = view.near(sample, scratch);
+        let foot = project(x, |y| near.evaluate(y));
         meter.evaluated(u64::from(foot.evaluations));
         Some(foot)
     };

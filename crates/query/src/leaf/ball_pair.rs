@@ -8,11 +8,9 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{LeafBlock, Part, ScanArrays};
 use nearmiss_lanes::wide::{bits, load};
 
-use crate::ask::answer::{Contact, Evidence};
 use crate::leaf::surfel_pair::near_box;
 use crate::pair::scan_pair::ScanPair;
 
@@ -141,52 +139,5 @@ impl ScanPair<'_> {
                 near_box(simd, leaf, &centres, radii) & bits(balls.simd_gt(zero))
             },
         ))
-    }
-
-    /// The contact of two points, at least one of which is a ball, if they are at most `margin`
-    /// apart in the world.
-    ///
-    /// Certified if a ball meets a ball or contains a measured point, estimated if it meets a
-    /// tangent disc.
-    pub(crate) fn ball_contact(&self, [i, j]: [usize; 2], margin: f64) -> Option<(Contact, Evidence)> {
-        let [p, q] = [self.views[0].point(i), self.views[1].point(j)].map(Vector3::from);
-        let [ra, rb] = self.balls([i, j]);
-        let (distance, most) = ((p - q).norm(), ra + rb + margin);
-        let sources = [self.views[0].scan().id(i), self.views[1].scan().id(j)];
-        let contact = |point: Vector3<f64>, apart: f64| Contact {
-            point: point.into(),
-            normals: None,
-            residual: 0.5 * apart,
-            sources,
-        };
-        if distance <= most {
-            let share = if most > 0.0 { (ra + 0.5 * margin) / most } else { 0.5 };
-            return Some((contact(p + (q - p) * share, distance), Evidence::Certified));
-        }
-        let (centre, side, k) = if ra > 0.0 && rb == 0.0 {
-            (p, 1, j)
-        } else if rb > 0.0 && ra == 0.0 {
-            (q, 0, i)
-        } else {
-            return None;
-        };
-        let foot = self.nearest_of_disc(side, k, centre);
-        let distance = (foot - centre).norm();
-        (distance <= most).then(|| {
-            let way = if distance > 0.0 { (ra + rb + 0.5 * margin).min(distance) / distance } else { 0.0 };
-            (contact(centre + (foot - centre) * way, distance), Evidence::Estimated)
-        })
-    }
-
-    /// The world point of the tangent disc of point `k` that is nearest to `x`.
-    fn nearest_of_disc(&self, side: usize, k: usize, x: Vector3<f64>) -> Vector3<f64> {
-        let (view, scan) = (self.views[side], [self.a, self.b][side]);
-        let centre = Vector3::from(view.point(k));
-        let normal = Vector3::from(view.stored_to_world().rotate(scan.normals[k].map(f64::from)));
-        let radius = f64::from(scan.discs.get(k)) * view.stored_to_world().scale();
-        let away = x - centre;
-        let across = away - normal * normal.dot(&away);
-        let length = across.norm();
-        centre + if length > radius { across * (radius / length) } else { across }
     }
 }

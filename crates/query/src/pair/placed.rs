@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{GeodesicKernel, KernelScratch, SurfaceGraph, SurfaceSamples};
-use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, ScanArrays};
+use nearmiss_hierarchy::{GatherScratch, NearField, PointHierarchy, SLAB, ScanArrays};
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Metric};
 
@@ -178,14 +178,16 @@ impl<'a> Placed<'a> {
     /// The same as [`Self::evaluate_with`], but faster if `x` is near the stored point `i`, and
     /// with the normal turned to the side of that point's normal.
     pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
-        match self.kernel() {
-            None => {
-                let at =
-                    self.scan.evaluate_near(i, self.stored_to_world.apply_inverse(x), &mut scratch.gather);
-                self.in_world(at.turned_to(self.scan.normals()[i].map(f64::from), 0.0))
-            }
-            Some(kernel) => self.evaluate_by_near(&kernel, i, x, &mut scratch.kernel),
-        }
+        self.near(i, scratch).evaluate(x)
+    }
+
+    /// f for several positions near the stored point `i`; see [`Self::evaluate_near`].
+    pub(crate) fn near<'s>(&'s self, i: usize, scratch: &'s mut ViewScratch) -> PlacedField<'s> {
+        let field = match self.kernel() {
+            None => Field::Euclidean(self.scan.near(i, &mut scratch.gather)),
+            Some(kernel) => Field::Geodesic(kernel, &mut scratch.kernel),
+        };
+        PlacedField { placed: self, i, normal: self.scan.normals()[i].map(f64::from), field }
     }
 
     /// Evaluates |f| at `x`; faster if `x` is near the last point evaluated with this scratch. The
@@ -218,6 +220,35 @@ impl<'a> Placed<'a> {
             bandwidth: at.bandwidth * scale,
             eigenvalues: at.eigenvalues.map(|l| l * scale * scale),
             ..at
+        }
+    }
+}
+
+/// The implicit function of a placed scan near one of its points.
+pub(crate) struct PlacedField<'a> {
+    placed: &'a Placed<'a>,
+    /// The point, and its normal.
+    i: usize,
+    normal: [f64; 3],
+    field: Field<'a>,
+}
+
+/// The implicit function in the stored frame.
+enum Field<'a> {
+    Euclidean(NearField<'a>),
+    Geodesic(GeodesicKernel<'a>, &'a mut KernelScratch),
+}
+
+impl PlacedField<'_> {
+    /// Evaluates f at `x`, in the world.
+    pub(crate) fn evaluate(&mut self, x: [f64; 3]) -> Evaluation {
+        let Self { placed, i, normal, field } = self;
+        match field {
+            Field::Euclidean(field) => {
+                let at = field.evaluate(placed.stored_to_world.apply_inverse(x));
+                placed.in_world(at.turned_to(*normal, 0.0))
+            }
+            Field::Geodesic(kernel, scratch) => placed.evaluate_by_near(kernel, *i, x, scratch),
         }
     }
 }

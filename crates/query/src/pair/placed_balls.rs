@@ -29,6 +29,17 @@ pub(crate) fn is_proper(pose: &Pose) -> bool {
     off <= MOST_OFF && far < f64::INFINITY && pose.scale() > 0.0
 }
 
+/// Returns `true` if both poses are proper and of similar scale.
+fn are_comparable([a, b]: [&Pose; 2]) -> bool {
+    let ratio = b.scale() / a.scale();
+    is_proper(a) && is_proper(b) && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)
+}
+
+/// Returns b's pose in a's stored frame; `None` if a pose is invalid or out of range.
+pub(crate) fn relative_pose(placed: [&Pose; 2]) -> Option<Pose> {
+    are_comparable(placed).then(|| placed[0].inverse().after(placed[1]))
+}
+
 /// Two bounding balls in the world.
 pub(crate) struct PlacedBalls<'a> {
     /// The poses of the stored frames.
@@ -51,8 +62,7 @@ impl<'a> PlacedBalls<'a> {
     /// pose is invalid or out of range.
     pub(crate) fn of(placed: [&'a Pose; 2], stored: [Ball; 2]) -> Option<Self> {
         let [a, b] = placed;
-        let ratio = b.scale() / a.scale();
-        if !(is_proper(a) && is_proper(b) && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
+        if !are_comparable(placed) {
             return None;
         }
         let place =
