@@ -11,7 +11,7 @@ use nearmiss_testdata::shapes::{Sampling, scorer_radius, sphere};
 
 /// Points of a sphere.
 fn ball() -> Vec<[f64; 3]> {
-    sphere(1.0).sample(Sampling::clean(0.06)).points
+    sphere(1.0).sample(Sampling::clean(0.08)).points
 }
 
 /// The sphere, deformed more and more: squeezed, bent and dented.
@@ -51,8 +51,8 @@ fn refitted_renewed_and_prepared_scans_agree_outside_the_band() {
         renewed.renew(&frame).unwrap();
         let cloud = PointCloud::from_positions(&frame).unwrap();
         let anew = Scan::build(&cloud, &options).unwrap();
-        for round in 0..30_u8 {
-            let away = unit_vector(rng).map(|c| c * (1.6 + 0.02 * f64::from(round)));
+        for length in [1.2, 1.7, 1.9, 2.0, 2.1, 2.2, 2.4, 2.8] {
+            let away = unit_vector(rng).map(|c| c * length);
             let pose = rotation(rng).with_translation(away);
             let truth = least(&frame, &frame, &pose);
             let mut verdicts = Vec::new();
@@ -78,16 +78,14 @@ fn refitted_renewed_and_prepared_scans_agree_outside_the_band() {
                 }
                 verdicts.push(verdict.is_intersecting());
             }
-            // Moved apart by two radii, a pair that is deep within each other still meets.
-            let apart = away.map(|c| c * (1.0 + 2.0 * r / 1.6));
-            let is_deep = least(&frame, &frame, &pose.with_translation(apart)) < 0.5 * r;
-            if truth > 2.0 * r || is_deep {
+            // The balls are at least 1.5 wide, so the nearest poses are deep.
+            if truth > 2.0 * r || length < 1.3 {
                 assert!(verdicts.iter().all(|v| *v == verdicts[2]), "step {step}, {truth}: {verdicts:?}");
                 seen[usize::from(verdicts[2])] += 1;
             }
         }
     }
-    assert!(seen[0] > 40 && seen[1] > 25 && proven > 120, "{seen:?} verdicts, {proven} proven");
+    assert!(seen[0] > 10 && seen[1] >= 7 && proven > 30, "{seen:?} verdicts, {proven} proven");
 }
 
 #[test]
