@@ -366,7 +366,10 @@ fn text() {
             "line 3: expected the end of the file after the last element, got more text; correct the count in the header",
         ),
         ("7\n", "line 1: expected 7 `point` elements, got 0; the file is cut off, or this count is wrong"),
-        ("# nothing\n", "expected at least 8 distinct finite points, got 0 (of 0 given)"),
+        (
+            "# nothing\n",
+            "expected at least 8 distinct finite points, got 0 (of 0 given); give more points, or sample the surface of a mesh",
+        ),
     ];
     for (text, message) in cases {
         says(text, "a.csv", &format!("a.csv: {message}"));
