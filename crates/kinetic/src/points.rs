@@ -163,7 +163,7 @@ impl Points {
         let slot = self.slot(point);
         let (word, bit) = (slot as usize / 64, 1 << (slot % 64));
         if self.bits.len() <= word {
-            self.bits.resize(word + 1, 0);
+            self.bits.resize(self.slots.len().div_ceil(64), 0);
         }
         if self.bits[word] & bit == 0 {
             self.bits[word] |= bit;
