@@ -38,7 +38,7 @@ impl KineticTree {
     /// [`KineticError::Number`] if `start` is not finite, [`KineticError::TooMany`] for 2³¹ points.
     pub fn of_points(start: f64, plans: impl IntoIterator<Item = FlightPlan>) -> Result<Self, KineticError> {
         let mut tree = Self::without_primitives(start, plans, 1)?;
-        for point in 0..tree.points.legs.len() {
+        for point in 0..tree.points.slots.len() {
             tree.primitives.add(&[id32(point)]);
         }
         tree.build();

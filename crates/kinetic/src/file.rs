@@ -25,7 +25,7 @@ const VERSION: u32 = 1;
 /// The most primitives of a leaf in a file.
 const MOST_IN_LEAF: usize = 64;
 
-/// Part 0 holds the present leg in each slot, part 1 the slot of each point.
+/// Parts 0 to 2 hold the courses in each slot, for each axis, part 3 the slot of each point.
 const LEGS: [u8; 4] = *b"LEGS";
 /// Part 0 holds the point of each leg to come, part 1 the legs.
 const LATER: [u8; 4] = *b"LATR";
@@ -79,8 +79,10 @@ impl KineticTree {
         let mut writer = Writer::new(KIND, VERSION);
         writer
             .metadata(&about)?
-            .section(LEGS, 0, &self.points.legs)?
-            .section(LEGS, 1, &self.points.slots)?
+            .section(LEGS, 0, &self.points.courses[0])?
+            .section(LEGS, 1, &self.points.courses[1])?
+            .section(LEGS, 2, &self.points.courses[2])?
+            .section(LEGS, 3, &self.points.slots)?
             .section(LATER, 0, &of)?
             .section(LATER, 1, &later)?
             .section(CORNERS, 0, &self.primitives.corners)?
@@ -230,10 +232,13 @@ impl KineticTree {
 /// Reads plans.
 fn load_points(file: &File, clock: f64) -> Result<Points, KineticError> {
     let mut points = Points::default();
-    points.legs = file.array(LEGS, 0)?.to_vec();
-    let count = points.legs.len();
-    points.slots = file.array(LEGS, 1)?.to_vec();
-    require(count <= MOST && points.slots.len() == count, "number of points", count)?;
+    points.slots = file.array(LEGS, 3)?.to_vec();
+    let count = points.slots.len();
+    require(count <= MOST, "number of points", count)?;
+    for (part, courses) in (0..).zip(&mut points.courses) {
+        *courses = file.array(LEGS, part)?.to_vec();
+        require(courses.len() == count, "number of courses", count)?;
+    }
     let mut unused = Marks(vec![false; count]);
     for (i, &slot) in points.slots.iter().enumerate() {
         unused.take(slot as usize, "place of point", i)?;
@@ -245,7 +250,7 @@ fn load_points(file: &File, clock: f64) -> Result<Points, KineticError> {
     }
     for i in 0..count {
         let leg = points.leg(id32(i));
-        let is_right = if unused.0[i] { leg[0].start.is_nan() } else { is_valid(leg) };
+        let is_right = if unused.0[i] { leg[0].start.is_nan() } else { is_valid(&leg) };
         require(is_right, "plan of point", i)?;
     }
     let (of, legs) = (file.array::<u32>(LATER, 0)?, file.array::<Leg>(LATER, 1)?);

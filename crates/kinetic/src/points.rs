@@ -1,7 +1,7 @@
 //! `Points`: the plans of all points, and the times at which their next legs start.
 
 use crate::error::KineticError;
-use crate::motion::State;
+use crate::motion::{Course, State};
 use crate::plan::{FlightPlan, Leg};
 use crate::queue::Queue;
 
@@ -18,8 +18,8 @@ pub(crate) type Side = usize;
 /// points.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Points {
-    /// The present leg in each slot.
-    pub(crate) legs: Vec<Leg>,
+    /// The present leg in each slot, an array for each axis: an event concerns one axis.
+    pub(crate) courses: [Vec<Course>; 3],
     /// The slot of each point.
     pub(crate) slots: Vec<u32>,
     /// The legs to come of each point, the last one first. Points at the end that have none may be
@@ -40,11 +40,11 @@ impl Points {
         let point = if let Some(point) = self.free.pop() {
             point
         } else {
-            if self.legs.len() >= MOST {
+            if self.slots.len() >= MOST {
                 return Err(KineticError::TooMany);
             }
-            let point = nearmiss_lanes::id32(self.legs.len());
-            self.legs.push(plan.first);
+            let point = nearmiss_lanes::id32(self.slots.len());
+            self.push(&plan.first);
             self.slots.push(point);
             point
         };
@@ -63,34 +63,47 @@ impl Points {
         self.slots[point as usize]
     }
 
-    pub(crate) fn leg(&self, point: u32) -> &Leg {
-        &self.legs[self.slot(point) as usize]
+    /// Returns the present leg of a point.
+    pub(crate) fn leg(&self, point: u32) -> Leg {
+        let slot = self.slot(point) as usize;
+        self.courses.each_ref().map(|courses| courses[slot])
     }
 
-    fn leg_mut(&mut self, point: u32) -> &mut Leg {
-        let slot = self.slot(point);
-        &mut self.legs[slot as usize]
+    fn set_leg(&mut self, point: u32, leg: &Leg) {
+        let slot = self.slot(point) as usize;
+        for (courses, course) in self.courses.iter_mut().zip(leg) {
+            courses[slot] = *course;
+        }
+    }
+
+    /// Adds a slot.
+    fn push(&mut self, leg: &Leg) {
+        for (courses, course) in self.courses.iter_mut().zip(leg) {
+            courses.push(*course);
+        }
     }
 
     /// Gives slots to points in this order, then to all others.
     pub(crate) fn arrange(&mut self, order: impl Iterator<Item = u32>) {
         const NONE: u32 = u32::MAX;
-        let count = nearmiss_lanes::id32(self.legs.len());
-        let mut slots = vec![NONE; self.legs.len()];
-        let mut legs = Vec::with_capacity(self.legs.len());
-        for point in order.chain(0..count) {
+        let count = self.slots.len();
+        let mut slots = vec![NONE; count];
+        let mut arranged =
+            Self { courses: [0; 3].map(|_: i32| Vec::with_capacity(count)), ..Self::default() };
+        for point in order.chain(0..nearmiss_lanes::id32(count)) {
             let slot = &mut slots[point as usize];
             if *slot == NONE {
-                *slot = nearmiss_lanes::id32(legs.len());
-                legs.push(*self.leg(point));
+                *slot = nearmiss_lanes::id32(arranged.courses[0].len());
+                arranged.push(&self.leg(point));
             }
         }
-        (self.legs, self.slots) = (legs, slots);
+        (self.courses, self.slots) = (arranged.courses, slots);
     }
 
     /// Removes a point. A removed one has no start.
     pub(crate) fn remove(&mut self, point: u32) {
-        self.leg_mut(point)[0].start = f64::NAN;
+        let slot = self.slot(point) as usize;
+        self.courses[0][slot].start = f64::NAN;
         if let Some(later) = self.later.get_mut(point as usize) {
             later.clear();
         }
@@ -104,7 +117,7 @@ impl Points {
         while let Some(next) = later.pop_if(|leg| leg[0].start <= clock) {
             first = next;
         }
-        *self.leg_mut(point) = first;
+        self.set_leg(point, &first);
         let start = later.last().map_or(f64::INFINITY, |leg| leg[0].start);
         self.knots.set(point, start);
         if self.later.len() <= point as usize {
@@ -122,7 +135,7 @@ impl Points {
         let next = later.pop();
         let start = later.last().map_or(f64::INFINITY, |leg| leg[0].start);
         if let Some(leg) = next {
-            *self.leg_mut(point) = leg;
+            self.set_leg(point, &leg);
         }
         self.knots.set(point, start);
     }
@@ -130,19 +143,19 @@ impl Points {
     /// Returns the plan of a point from its present leg on.
     pub(crate) fn plan(&self, point: u32) -> FlightPlan {
         let later = self.later.get(point as usize).cloned().unwrap_or_default();
-        FlightPlan { first: *self.leg(point), later }
+        FlightPlan { first: self.leg(point), later }
     }
 
     /// Returns the position of a point in its present leg.
     pub(crate) fn position(&self, point: u32, time: f64) -> [f64; 3] {
-        self.leg(point).each_ref().map(|course| course.position(time))
+        self.leg(point).map(|course| course.position(time))
     }
 
     /// Returns the state of the point in a slot, towards a side, at `time`.
     #[inline]
     pub(crate) fn state(&self, slot: u32, side: Side, time: f64) -> State {
         let (axis, sign) = if side < 3 { (side, -1.0) } else { (side - 3, 1.0) };
-        self.legs[slot as usize][axis].state(time, sign)
+        self.courses[axis][slot as usize].state(time, sign)
     }
 
     /// Notes that the plan of `point` changed.
@@ -150,7 +163,7 @@ impl Points {
         let slot = self.slot(point);
         let (word, bit) = (slot as usize / 64, 1 << (slot % 64));
         if self.bits.len() <= word {
-            self.bits.resize(word + 1, 0);
+            self.bits.resize(self.slots.len().div_ceil(64), 0);
         }
         if self.bits[word] & bit == 0 {
             self.bits[word] |= bit;
@@ -176,6 +189,6 @@ impl Points {
         let each = |legs: &Vec<Leg>| size_of::<Vec<Leg>>() + legs.len() * size_of::<Leg>();
         let later: usize = self.later.iter().map(each).sum();
         let words = self.slots.len() + self.free.len() + self.changed.len() + 2 * self.bits.len();
-        self.legs.len() * size_of::<Leg>() + later + words * size_of::<u32>() + self.knots.bytes()
+        self.slots.len() * size_of::<Leg>() + later + words * size_of::<u32>() + self.knots.bytes()
     }
 }

@@ -63,7 +63,7 @@ impl KineticTree {
     /// Returns the number of points, whether a primitive uses them or not.
     #[must_use]
     pub const fn point_count(&self) -> usize {
-        self.points.legs.len() - self.points.free.len()
+        self.points.slots.len() - self.points.free.len()
     }
 
     /// Returns the work done since the tree was built.
@@ -191,7 +191,7 @@ impl KineticTree {
             return Aabb::EMPTY;
         }
         let place = |side: Side| {
-            let course = &self.points.legs[winners[side] as usize][side % 3];
+            let course = &self.points.courses[side % 3][winners[side] as usize];
             course.position(self.clock)
         };
         Aabb { min: [place(0), place(1), place(2)], max: [place(3), place(4), place(5)] }
