@@ -171,12 +171,13 @@ fn worlds_follow_a_scan_that_changes() {
     let points = ball();
     let mut world = World::new();
     let a = world.insert(MovingScan::new(&points, &BuildOptions::default()).unwrap(), &Pose::IDENTITY);
-    let away = Pose::from_translation([3.5, 0.0, 0.0]);
+    // The box of a ball may lie in any direction, so its corners may be √3 away, and a little more.
+    let away = Pose::from_translation([4.2, 0.0, 0.0]);
     let b = world.insert(MovingScan::new(&points, &BuildOptions::default()).unwrap(), &away);
     let mut pairs = Vec::new();
     world.near_pairs(Bodies::All, 0.1, &mut pairs);
     assert!(pairs.is_empty(), "far apart at first: {pairs:?}");
-    let long: Vec<[f64; 3]> = points.iter().map(|[x, y, z]| [1.9 * x + 0.9, *y, *z]).collect();
+    let long: Vec<[f64; 3]> = points.iter().map(|[x, y, z]| [2.5 * x + 1.5, *y, *z]).collect();
     let moved = world.change(a, |body| match body {
         Body::Scan(scan) => Some(scan.move_to(&long)),
         Body::Mesh(_) => None,
