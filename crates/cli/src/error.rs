@@ -79,7 +79,7 @@ pub enum CliError {
         cause: SampleError,
     },
     /// A slice map could not be built from these points with these options.
-    #[error("{}: {cause}", path.display())]
+    #[error("{}: {cause}{}", path.display(), options_for(cause))]
     Slices {
         /// The input.
         path: PathBuf,
@@ -198,6 +198,14 @@ impl CliError {
     #[must_use]
     pub fn is_silent(&self) -> bool {
         self.status() == 0
+    }
+}
+
+/// Returns the options that mend this fault, in brackets; empty for faults that name them.
+fn options_for(cause: &SliceError) -> &'static str {
+    match cause {
+        SliceError::Memory { .. } => " (--pixel or --resolution, --slice-height, --memory)",
+        _ => "",
     }
 }
 

@@ -143,7 +143,7 @@ mod tests {
         assert_eq!(options.with_neighbours(0).check(), Err(GraphError::Neighbours(0)));
         assert_eq!(options.with_neighbours(33).check(), Err(GraphError::Neighbours(33)));
         assert_eq!(options.with_prune(Prune::Quartiles(-0.1)).check(), Err(GraphError::Prune(-0.1)));
-        assert!(options.with_prune(Prune::Quartiles(f64::NAN)).check().is_err(), "no number");
+        assert!(options.with_prune(Prune::Quartiles(f64::NAN)).check().is_err(), "NaN quartiles");
         assert_eq!(options.with_prune(Prune::Never).check(), Ok(()));
         for bad in [f32::NAN, f32::INFINITY, -1.1e18] {
             let positions = [[0.0; 3], [1e18, 0.0, bad]];

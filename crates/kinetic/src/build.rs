@@ -46,8 +46,8 @@ impl KineticTree {
     }
 
     /// Builds a tree over primitives, which index moving points, with the clock at `start`. They
-    /// may have different numbers of points. Those inserted later may have as many as the largest
-    /// of these, or three if there are none.
+    /// may have different numbers of points. Primitives inserted later may have as many points as
+    /// the largest of these; without any, up to three.
     ///
     /// A Bézier patch is the list of its control points. So is a rational patch, if its weights are
     /// positive.

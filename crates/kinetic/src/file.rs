@@ -273,11 +273,11 @@ fn require(is_right: bool, what: &'static str, index: usize) -> Result<(), Kinet
     if is_right { Ok(()) } else { Err(KineticError::Damaged { what, index }) }
 }
 
-/// Marks of things that may be used once.
+/// Marks for items that a file may use once.
 struct Marks(Vec<bool>);
 
 impl Marks {
-    /// Marks a thing; fails if there is none of this index, or if it was marked.
+    /// Marks item `i`. Fails if there is no such item, or if it is marked already.
     fn take(&mut self, i: usize, what: &'static str, index: usize) -> Result<(), KineticError> {
         let mark = self.0.get_mut(i).filter(|mark| !**mark);
         *mark.ok_or(KineticError::Damaged { what, index })? = true;

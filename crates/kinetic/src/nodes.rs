@@ -26,7 +26,7 @@ pub(crate) const FRESH: u32 = 2;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct Link {
-    /// The earliest failure of a certificate of this node, in seconds; infinite if there is none.
+    /// The earliest failure of a certificate of this node, in seconds; infinite if none can fail.
     pub(crate) own: f64,
     /// The earliest failure at or below this node.
     pub(crate) first: f64,

@@ -58,7 +58,7 @@ const fn winner_side(tree: usize, side: Side) -> Side {
 struct NodePair {
     /// The nodes; [`NONE`] in an unused pair.
     nodes: [u32; 2],
-    /// The first of the two pairs below; 0 if there are none.
+    /// The first of the two pairs below this one; 0 for a pair of leaves.
     children: u32,
     /// The side on which the boxes are apart, or that will part first.
     side: Side,
@@ -103,7 +103,7 @@ impl Pairs {
         self.settle(ROOTS, view);
     }
 
-    /// Returns the time at which the next pair meets or parts; infinite if there is none.
+    /// Returns the time at which the next pair meets or parts; infinite if no pair ever will.
     pub(crate) fn next_time(&self) -> f64 {
         self.queue.first().map_or(f64::INFINITY, |(time, _)| time)
     }

@@ -119,7 +119,7 @@ impl KineticTree {
         count
     }
 
-    /// Returns the box of all primitives now; [`Aabb::EMPTY`] if there are none.
+    /// Returns the box of all primitives now; [`Aabb::EMPTY`] for an empty tree.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.node_box(ROOT)
@@ -197,7 +197,7 @@ impl KineticTree {
         Aabb { min: [place(0), place(1), place(2)], max: [place(3), place(4), place(5)] }
     }
 
-    /// Returns the time of the next event or leg; infinite if there is none.
+    /// Returns the time of the next event or leg; infinite if none is due.
     #[inline]
     pub(crate) fn next_time(&self) -> f64 {
         let knot = self.points.knots.first().map_or(f64::INFINITY, |(time, _)| time);

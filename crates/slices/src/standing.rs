@@ -61,7 +61,7 @@ pub enum StartError {
         place: [f64; 3],
         /// The reason.
         cause: Misplaced,
-        /// The nearest place where the avatar can stand; `None` if there is none on the map.
+        /// The nearest place where the avatar can stand; `None` if the map has no such place.
         nearest: Option<Standing>,
     },
     /// The place is not finite, or a slice is not loaded.

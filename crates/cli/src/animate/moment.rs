@@ -6,6 +6,7 @@ use super::body::Found;
 use crate::console::Results;
 use crate::digits::{count, short};
 use crate::error::CliError;
+use crate::report::median;
 
 /// The JSON output of `animate`.
 #[derive(Debug, Serialize)]
@@ -58,20 +59,21 @@ pub(super) struct Summary {
     verdicts: Vec<&'static str>,
     rebuilt: usize,
     events: u64,
-    updates: Vec<f64>,
-    queries: Vec<f64>,
+    updates: Vec<f32>,
+    queries: Vec<f32>,
 }
 
 impl Summary {
+    #[expect(clippy::cast_possible_truncation, reason = "times to show with three digits")]
     pub(super) fn add(&mut self, moment: &Moment) {
         self.verdicts.extend(moment.found.map(|found| found.verdict));
         self.rebuilt += moment.rebuilt;
         self.events += moment.events;
-        self.updates.push(moment.update_micros);
-        self.queries.push(moment.query_micros);
+        self.updates.push(moment.update_micros as f32);
+        self.queries.push(moment.query_micros as f32);
     }
 
-    pub(super) fn text(mut self) -> String {
+    pub(super) fn text(self) -> String {
         let times = count(self.updates.len() as u64, "query time");
         let of = |word: &str| self.verdicts.iter().filter(|verdict| **verdict == word).count();
         let verdicts = ["intersecting", "separated", "undecided"];
@@ -82,7 +84,7 @@ impl Summary {
             .map(|(count, word)| format!("{count} {word}"))
             .collect();
         let verdicts = if verdicts.is_empty() { "no test".to_owned() } else { verdicts.join(", ") };
-        let (update, query) = (median(&mut self.updates), median(&mut self.queries));
+        let (update, query) = (median(&self.updates), median(&self.queries));
         format!(
             "{times}: {verdicts}; {}; medians: moved in {} µs, asked in {} µs",
             if self.events > 0 {
@@ -90,14 +92,8 @@ impl Summary {
             } else {
                 format!("prepared anew {}", count(self.rebuilt as u64, "time"))
             },
-            short(update),
-            short(query)
+            short(update.into()),
+            short(query.into())
         )
     }
-}
-
-/// Returns the middle value; 0 if there is none.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or_default()
 }

@@ -9,6 +9,7 @@ use nearmiss::{Aabb, CloudError, Workspace};
 
 use super::report::{Report, open};
 use crate::console::{Bar, Console, now};
+use crate::digits::short;
 use crate::error::CliError;
 use crate::memory::MemoryArgs;
 use crate::parse::parse_length;
@@ -115,6 +116,13 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
         }
     };
     drop(limit);
+    if let Some(other) = other_up(args.up, &bounds) {
+        let [height, length] = [args.up, other].map(|up| short(extent(up, &bounds)));
+        let up = args.up;
+        console.note(format_args!(
+            "{name} extends {height} along {up} and {length} along {other}; if {other} points up, pass --up {other}"
+        ));
+    }
     let unsuitable = |cause| CliError::Slices { path: args.input.clone(), cause };
     let (plan, work) = place(args, &options(args, matches!(source, Pieces::Mesh { .. })), &bounds, console)?;
     let [width, height, slices] = plan.grid().counts;
@@ -148,6 +156,21 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     work.remove();
     let folder = open(&args.output)?;
     Report::new(&folder, start.elapsed()).tell(&folder, args.json)
+}
+
+/// Returns the extent of the bounds along an axis.
+fn extent(up: Up, bounds: &Aabb) -> f64 {
+    up.to_map(bounds.half_extents())[2].abs() * 2.0
+}
+
+/// Returns the axis that points up more probably than `up`: the shortest one, if the bounds are much
+/// longer along `up`, because buildings are seldom higher than wide.
+fn other_up(up: Up, bounds: &Aabb) -> Option<Up> {
+    /// The ratio of the extents at which a note is given. A stairwell may be this high.
+    const MUCH: f64 = 1.5;
+    let longer = |other: &Up| extent(up, bounds) > MUCH * extent(*other, bounds);
+    let by_extent = |a: &Up, b: &Up| extent(*a, bounds).total_cmp(&extent(*b, bounds));
+    [Up::X, Up::Y, Up::Z].into_iter().filter(longer).min_by(by_extent)
 }
 
 /// Chooses where the voxels are kept: in memory, or on disk if `--memory` was given and they need

@@ -3,11 +3,11 @@
 
 use std::fs;
 
-use nearmiss_testdata::house::house;
+use nearmiss_testdata::house::{house, scanned};
 use nearmiss_testdata::shapes::sphere;
 
 use crate::faults::spawn;
-use crate::running::Place;
+use crate::running::{Place, text};
 use crate::slicing::{obj, with_house};
 
 /// Names and contents of the files of a map.
@@ -37,7 +37,11 @@ fn a_map_larger_than_memory_is_made_on_disk() {
         assert_eq!(files_of(&place, "disk"), files_of(&place, "memory"), "{input}");
         assert!(!place.path("disk.work").exists());
     }
-    place.refused(1, &build("house.xyz", "other", &["--memory", "200kB"]), &["house.xyz", "larger pixels"]);
+    place.refused(
+        1,
+        &build("house.xyz", "other", &["--memory", "200kB"]),
+        &["house.xyz", "larger pixels", "--slice-height"],
+    );
 
     let args = build("house.xyz", "disk", &memory);
     let mut child = spawn(&place, &args);
@@ -95,4 +99,17 @@ fn a_build_that_is_killed_leaves_the_old_map_or_the_new_one() {
         place.ok(&build(input, "map"));
         assert!(files_of(&place, "map") == *files, "{input}: nothing else is left");
     }
+}
+
+#[test]
+fn a_note_names_the_axis_that_may_point_up() {
+    let place = Place::new();
+    let turned: Vec<[f64; 3]> =
+        scanned(&house(), 0.1, 0.003, 3).into_iter().map(|[x, y, z]| [y, z, x]).collect();
+    place.write("turned.xyz", text(&turned));
+    let build = |up| ["slices", "build", "turned.xyz", "-o", "turned", "--pixel", "0.2", "--up", up];
+    let wrong = place.ok(&build("z"));
+    assert!(wrong.errors.contains("if y points up, pass --up y"), "{}", wrong.errors);
+    let right = place.ok(&build("y"));
+    assert!(!right.errors.contains("points up"), "{}", right.errors);
 }

@@ -106,7 +106,7 @@ mod tests {
         }
         assert_eq!(up(f32::INFINITY), BOUNDLESS);
         assert_eq!(up(f32::NAN), BOUNDLESS, "never less than it may be");
-        assert!(!Growth { low: [BOUNDLESS + 1, 0, 0], high: [0; 3] }.is_sound(), "no number");
+        assert!(!Growth { low: [BOUNDLESS + 1, 0, 0], high: [0; 3] }.is_sound(), "beyond the largest growth");
         assert!(!Growth { low: [0; 3], high: [0x8001, 0, 0] }.is_sound(), "less than nothing");
         assert!(Growth { low: [up(0.5); 3], high: [up(3e9); 3] }.is_sound());
     }

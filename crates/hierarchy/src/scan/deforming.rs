@@ -228,7 +228,7 @@ impl DeformingScan {
             let distance = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
             return Err(DeformError::Apart { index, twin, distance });
         }
-        // Those of the positions as they are stored. Rounding is monotonic.
+        // The bounds of the rounded positions are the rounded bounds, because rounding is monotonic.
         let stored = |p: [f64; 3]| frame.to_world(frame.to_local(p));
         Ok((frame, Aabb { min: stored(bounds.min), max: stored(bounds.max) }))
     }

@@ -68,7 +68,7 @@ fn wrong_input_is_rejected() {
     tree.advance(2.5).unwrap();
     let message = tree.advance(2.0).unwrap_err().to_string();
     assert!(message.starts_with("expected a time not before 2.5 s, got 2 s; "), "{message}");
-    assert!(matches!(tree.advance(f64::NAN), Err(KineticError::Number { .. })), "no number");
+    assert!(matches!(tree.advance(f64::NAN), Err(KineticError::Number { .. })), "a time that is NaN");
     assert!(matches!(tree.advance(f64::INFINITY), Err(KineticError::Number { .. })), "no end");
     let plan = FlightPlan::at_rest(0.0, [1.0; 3]).unwrap();
     assert!(matches!(tree.set_plan(1, plan), Err(KineticError::NoSuchPoint { point: 1 })), "one point");

@@ -154,7 +154,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// A placeholder for a question that was not asked: nothing was spent and nothing is known.
+    /// The answer to a query that was never run: undecided, at no cost.
     pub const UNASKED: Self = Self {
         verdict: Verdict::Undecided(Reason::Budget { likelihood: 0.5 }),
         band: f64::INFINITY,

@@ -112,7 +112,7 @@ impl MeshScanPairing<'_> {
     }
 }
 
-/// The lane among `lanes` with the least gap; the first among equals. `None` if there are none.
+/// Returns the lane with the least gap, the first among equals; `None` if `lanes` is empty.
 #[inline]
 fn nearest_lane(gaps: &[f32; WIDTH], lanes: u32) -> Option<usize> {
     let mut lanes = Bits(lanes);
