@@ -168,7 +168,7 @@ fn draw(scan: &Scan, a: &Placed<'_>, plan: &CollidePlan, distance: f64, path: Pa
     let b_pose = pose(scan, distance);
     let b = scan.at(&b_pose);
     let answer = Pair::new(*a, b).collide(plan, &mut Scratch::default());
-    nearmiss_cli::contact_picture(a, &b, &answer).save(&path)?;
+    nearmiss_cli::save_picture(&nearmiss_cli::contact_picture(a, &b, &answer), &path)?;
     Ok(path)
 }
 

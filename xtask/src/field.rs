@@ -122,7 +122,7 @@ fn paint(args: &Args, path: &Path, output: &Path) -> Outcome {
         field
     });
     let subject = paint::Subject { name: name(path), noise: args.noise, unit };
-    paint::paint(&rough, &slice, &fields, &subject).save(output)?;
+    nearmiss_cli::save_picture(&paint::paint(&rough, &slice, &fields, &subject), output)?;
     Ok(())
 }
 

@@ -30,7 +30,7 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
             path.display()
         )
     };
-    picture.ok_or_else(none)?.save(&output)?;
+    nearmiss_cli::save_picture(&picture.ok_or_else(none)?, &output)?;
     println!("{}", output.display());
     Ok(())
 }

@@ -27,7 +27,7 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     }
     let output = output.unwrap_or_else(|| root().join("target/level.png"));
     let scan = prepared(&scan.unwrap_or_else(|| dragon_path(Dragon::Points23k)))?;
-    nearmiss_cli::level_picture(&scan, &depths).save(&output)?;
+    nearmiss_cli::save_picture(&nearmiss_cli::level_picture(&scan, &depths), &output)?;
     println!("{}", output.display());
     Ok(())
 }

@@ -337,7 +337,7 @@ fn answer_one(
             Some((found, evidence)) => paint_apart(scans, &found, evidence, &style),
             None => picture::paint(scans, &asked.answer, &style),
         };
-        picture.save(path)?;
+        output::save_picture(&picture, path)?;
         drop(bar);
     }
     question.tell(out, &asked, args)

@@ -141,7 +141,7 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
             view: args.view,
             unit: args.pair.world_unit(),
         };
-        curve_picture::paint([&a, &b], &found, &style).save(path)?;
+        output::save_picture(&curve_picture::paint([&a, &b], &found, &style), path)?;
         drop(bar);
     }
     tell(&found, missed.as_ref(), [&a, &b], micros, args.json)

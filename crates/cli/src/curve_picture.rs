@@ -2,13 +2,13 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Curve, Curves, Placed};
+use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE, Splat};
+use nearmiss_draw::legend;
+use nearmiss_draw::marks::{frame, mark, title};
+use nearmiss_draw::picture::Picture;
 
-use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat};
 use crate::digits::count;
-use crate::image::Picture;
-use crate::legend;
-use crate::marks::{frame, mark, scale_bar_in, title};
-use crate::picture::{self, GAP, LEGEND, PANEL, Style, paint_both, splat};
+use crate::picture::{self, GAP, LEGEND, PANEL, Style, paint_both, scale_bar_in, splat};
 use crate::viewpoint::sample;
 
 /// Size in fine pixels of the whole view, or of the whole view and the close view beside it.
@@ -252,11 +252,11 @@ mod tests {
             assert!((found.length() - depth).abs() < 0.7, "{} for {depth}", found.length());
             let (width, _) = picture.size();
             let middle = (GAP + PANEL + GAP / 2) / FINE;
-            let pixel = &picture.pixels()[3 * (2 * GAP / FINE * width + middle)..][..3];
+            let pixel = &picture.pixels[3 * (2 * GAP / FINE * width + middle)..][..3];
             assert_eq!(pixel == GROUND, is_close, "{depth}: {pixel:?} between the views");
             let is_curve = |p: &&[u8]| p.iter().zip(CURVE).all(|(&x, y)| x.abs_diff(y) < 30);
             let count = |columns: std::ops::Range<usize>| {
-                let rows = picture.pixels().chunks(3 * width).take((GAP + HEIGHT) / FINE);
+                let rows = picture.pixels.chunks(3 * width).take((GAP + HEIGHT) / FINE);
                 rows.flat_map(|row| row[3 * columns.start..3 * columns.end].chunks(3))
                     .filter(is_curve)
                     .count()

@@ -232,7 +232,7 @@ impl Question<'_> {
                 view: self.args.view,
                 unit: self.args.pair.world_unit(),
             };
-            paint_distance(scans, &found, &style).save(path)?;
+            output::save_picture(&paint_distance(scans, &found, &style), path)?;
         }
         if self.args.json {
             results.json(&report(&found, micros))?;

@@ -2,13 +2,13 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Distance, Evidence, Placed};
+use nearmiss_draw::canvas::{Area, Camera, Canvas, FINE};
+use nearmiss_draw::marks::{frame, label, label_size, mark, title};
+use nearmiss_draw::picture::Picture;
 
-use crate::canvas::{Area, Camera, Canvas, FINE};
-use crate::image::Picture;
-use crate::marks::{frame, label, label_size, mark, scale_bar_in, title};
 use crate::picture::{
     GAP, GROUND, HALO, INK, LARGEST, LEGEND, OF_A, OF_B, PANEL, PANEL_GROUND, Style, across, directions, dot,
-    legend, obstacle, paint_both, sample, splat,
+    legend, obstacle, paint_both, sample, scale_bar_in, splat,
 };
 use crate::sentence::{bracket, unit};
 use crate::viewpoint::{Upright, scale_of};
@@ -278,7 +278,7 @@ mod tests {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels")]
             let [column, row] = [x, y].map(|c| (c / fine) as usize);
             assert!((GAP / FINE..(GAP + PANEL) / FINE).contains(&column), "{column}");
-            let pixel = &picture.pixels()[3 * (row * picture.size().0 + column)..][..3];
+            let pixel = &picture.pixels[3 * (row * picture.size().0 + column)..][..3];
             assert_eq!(pixel, colour, "at {column}, {row}");
         }
     }
@@ -294,7 +294,7 @@ mod tests {
         let is_ink = |p: &[u8]| p.iter().zip(INK).all(|(x, y)| x.abs_diff(y) < 8);
         let width = picture.size().0;
         for half in [0, width / 2] {
-            let rows = picture.pixels().chunks(3 * width);
+            let rows = picture.pixels.chunks(3 * width);
             let count: usize = rows
                 .take(PANEL / FINE)
                 .map(|r| r[3 * half..][..3 * (width / 2)].chunks(3).filter(|p| is_ink(p)).count())

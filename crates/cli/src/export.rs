@@ -136,7 +136,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
         wrote(scan.len(), "point", path);
     }
     if let Some(path) = &args.image {
-        kinds_picture::paint(&scan, &args.view).save(path)?;
+        output::save_picture(&kinds_picture::paint(&scan, &args.view), path)?;
     }
     Ok(())
 }

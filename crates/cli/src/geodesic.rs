@@ -3,11 +3,11 @@
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::graph::{GeodesicScratch, SurfaceGraph};
 use nearmiss::{Pose, Scan};
+use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE};
+use nearmiss_draw::legend;
+use nearmiss_draw::picture::Picture;
 
-use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
 use crate::digits::{count, short};
-use crate::image::Picture;
-use crate::legend;
 use crate::picture::{scale_bar, scan_camera, splat};
 
 /// Sizes in fine pixels.
@@ -191,7 +191,7 @@ mod tests {
         let scan = scan.with_graph(&cloud, &GraphOptions::default(), None).unwrap();
         assert!(geodesic_picture(&scan, scan.len()).is_none(), "no such point");
         let picture = geodesic_picture(&scan, 0).unwrap();
-        let count = |is: fn(&[u8]) -> bool| picture.pixels().chunks(3).filter(|p| is(p)).count();
+        let count = |is: fn(&[u8]) -> bool| picture.pixels.chunks(3).filter(|p| is(p)).count();
         assert!(count(|p| p[1] > p[2].saturating_add(60)) > 1000, "near: yellow to green");
         assert!(count(|p| p[2] > p[1].saturating_add(40)) > 1000, "far: blue to violet");
         let ways = Ways::new(&scan, scan.graph().unwrap(), 0);

@@ -1,13 +1,14 @@
 //! A picture of a scan in which each point has the colour of its kind, with a legend.
 
 use nearmiss::{PointKind, Pose, Scan};
+use nearmiss_draw::canvas::{Area, Canvas, Colour, FINE};
+use nearmiss_draw::legend;
+use nearmiss_draw::picture::Picture;
 
-use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::digits::short;
 use crate::health::kind_name;
-use crate::image::Picture;
+use crate::picture;
 use crate::viewpoint::ViewArgs;
-use crate::{legend, picture};
 
 /// Sizes in fine pixels.
 const WIDTH: usize = 1572 * FINE;

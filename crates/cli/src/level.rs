@@ -2,12 +2,12 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Pose, Scan};
+use nearmiss_draw::canvas::{Area, Canvas, Colour, FINE};
+use nearmiss_draw::legend;
+use nearmiss_draw::picture::Picture;
 
-use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::digits::{count, short};
 use crate::export::at_depth;
-use crate::image::Picture;
-use crate::legend;
 use crate::picture::{scale_bar, scan_camera, splat};
 use crate::report;
 
@@ -118,8 +118,8 @@ mod tests {
         let [one, two] = [&[2][..], &[1, 3]].map(|depths| level_picture(&scan, depths));
         let panel = (PANEL + GAP) / FINE;
         assert_eq!(two.size().0, one.size().0 + panel);
-        let reddish = |p: &Picture| p.pixels().chunks(3).filter(|p| p[0] > p[2].saturating_add(40)).count();
-        let bluish = |p: &Picture| p.pixels().chunks(3).filter(|p| p[2] > p[0].saturating_add(40)).count();
+        let reddish = |p: &Picture| p.pixels.chunks(3).filter(|p| p[0] > p[2].saturating_add(40)).count();
+        let bluish = |p: &Picture| p.pixels.chunks(3).filter(|p| p[2] > p[0].saturating_add(40)).count();
         assert!(reddish(&one) > 1000 && bluish(&one) > 1000, "nodes of several colours");
     }
 }

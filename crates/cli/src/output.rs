@@ -6,6 +6,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use nearmiss::store::replace_file;
+use nearmiss_draw::picture::Picture;
 
 use crate::error::CliError;
 
@@ -95,6 +96,14 @@ pub(crate) fn replace_plain(
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> io::Result<()>,
 ) -> Result<(), CliError> {
     replace(path, |out| write(out).map_err(CliError::writing(path)))
+}
+
+/// Writes a picture as PNG. If that fails, no partial file is left.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save_picture(picture: &Picture, path: &Path) -> Result<(), CliError> {
+    replace_plain(path, |out| picture.encode(out))
 }
 
 /// As [`replace_plain`], but writes to standard output if `path` is `-`.

@@ -4,17 +4,17 @@ use std::path::Path;
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Answer, Contact, Evidence, Placed, PointId, Verdict};
+use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, shade};
+use nearmiss_draw::legend;
+use nearmiss_draw::marks::{self, arrow, frame, mark, title};
+use nearmiss_draw::picture::Picture;
 
-use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, shade};
 use crate::error::CliError;
-use crate::image::Picture;
-use crate::legend;
-use crate::marks::{arrow, frame, mark, scale_bar_in, title};
 use crate::units::WorldUnit;
 use crate::viewpoint::{Upright, ViewArgs, scale_of};
 
-pub(crate) use crate::marks::{GROUND, HALO, INK, PANEL_GROUND, scale_bar};
 pub(crate) use crate::viewpoint::{across, directions, sample, scan_camera};
+pub(crate) use nearmiss_draw::marks::{GROUND, HALO, INK, PANEL_GROUND};
 
 /// Sizes in fine pixels.
 pub(crate) const PANEL: usize = 780 * FINE;
@@ -86,6 +86,16 @@ pub(crate) struct Style {
     pub(crate) view: ViewArgs,
     /// The unit of lengths.
     pub(crate) unit: WorldUnit,
+}
+
+/// Draws a scale bar for lengths in the unit of the file.
+pub(crate) fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
+    scale_bar_in(canvas, camera, WorldUnit::OfFile);
+}
+
+/// Draws a scale bar for lengths in this unit.
+pub(crate) fn scale_bar_in(canvas: &mut Canvas, camera: &Camera, unit: WorldUnit) {
+    marks::scale_bar(canvas, camera, |length| unit.scale(length));
 }
 
 /// Paints a [`contact_picture`] in a style.

@@ -7,8 +7,7 @@ use nearmiss::Placed;
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::slices::Up;
 use nearmiss::surface::symmetric_eigen;
-
-use crate::canvas::{Area, Camera};
+use nearmiss_draw::canvas::{Area, Camera};
 
 /// Options of pictures of scans: the axis that points up, and the viewpoint.
 #[derive(Debug, Clone, Copy, Default, Args)]

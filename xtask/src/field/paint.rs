@@ -1,7 +1,8 @@
 //! The picture: two slices side by side, with a legend.
 
 use nearmiss::PointHierarchy;
-use nearmiss_cli::{Area, Canvas, Colour, FINE, Picture};
+use nearmiss_draw::canvas::{Area, Canvas, Colour, FINE};
+use nearmiss_draw::picture::Picture;
 
 use super::place::Centre;
 use super::slice::{Field, Slice, Value};

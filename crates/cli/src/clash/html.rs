@@ -4,12 +4,12 @@ use std::io::{self, Write};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use nearmiss_draw::picture::Picture;
 
 use crate::clash::list::List;
 use crate::clash::pictures::Pictures;
 use crate::clash::table::{cells, sentence};
 use crate::digits::{grouped, short};
-use crate::image::Picture;
 
 const STYLE: &str = "\
 body{font:15px/1.45 system-ui,sans-serif;color:#1e2228;max-width:1120px;margin:2em auto;padding:0 1em}

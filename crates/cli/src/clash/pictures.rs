@@ -2,11 +2,11 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Aabb, Clash, ClashKind, Placed};
+use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE};
+use nearmiss_draw::picture::Picture;
 
-use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
 use crate::clash::list::List;
 use crate::console::Bar;
-use crate::image::Picture;
 use crate::picture::{
     GROUND, HALO, LARGEST, OF_A, OF_B, PANEL_GROUND, directions, dot, obstacle, scale_bar, splat,
     stored_index,

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use nearmiss_draw::picture::Picture;
 
 use super::report::open;
 use crate::console::{self, Console, Results};
 use crate::digits::count;
 use crate::error::CliError;
-use crate::image::Picture;
+use crate::output;
 
 /// Options of `slices export`.
 #[derive(Debug, Clone, Args)]
@@ -43,7 +44,7 @@ pub(super) fn run(args: &SlicesExportArgs) -> Result<(), CliError> {
         };
         let [width, height] = [image.width(), image.height()].map(|side| side as usize);
         let picture = Picture { width, height, pixels: image.rgb() };
-        picture.save(&args.output.join(format!("slice-{slice:04}.png")))?;
+        output::save_picture(&picture, &args.output.join(format!("slice-{slice:04}.png")))?;
     }
     drop(bar);
     let mut results = Results::new();

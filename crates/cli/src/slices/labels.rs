@@ -1,6 +1,6 @@
 //! Placement of labels without overlap.
 
-use crate::canvas::Area;
+use nearmiss_draw::canvas::Area;
 
 /// The areas of the labels that are placed already.
 #[derive(Default)]

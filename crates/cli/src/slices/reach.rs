@@ -112,7 +112,7 @@ pub(super) fn run(args: &ReachArgs) -> Result<(), CliError> {
     }
     if let Some(path) = &args.image {
         let marks = Marks { start: report.start, others: &[] };
-        paint(&map, &avatar, &storeys, &reach, &marks).save(path)?;
+        output::save_picture(&paint(&map, &avatar, &storeys, &reach, &marks), path)?;
     }
     tell(&report, grid, args.json)
 }

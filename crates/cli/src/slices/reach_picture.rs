@@ -1,12 +1,12 @@
 //! The picture of an avatar's reach from above, with a view for each storey.
 
 use nearmiss::slices::{Avatar, Reach, SliceMap, Storey, storey_of};
+use nearmiss_draw::canvas::Colour;
+use nearmiss_draw::picture::Picture;
 
 use super::labels::Labels;
 use super::storey_view::{AIM, EMPTY, FLOOR, IN_THE_WAY, STEP, Sheet, window};
-use crate::canvas::Colour;
 use crate::digits::{rounded, short};
-use crate::image::Picture;
 
 const REACHED: Colour = [120, 176, 226];
 

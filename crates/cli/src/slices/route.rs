@@ -169,7 +169,7 @@ fn paint_walk(
     walked.map_err(failed)?;
     track.end(before, distance);
     let storeys = map.storeys(avatar).map_err(|cause| failed(cause.into()))?;
-    walk_picture::paint(map, &track, avatar, &storeys).save(path)
+    output::save_picture(&walk_picture::paint(map, &track, avatar, &storeys), path)
 }
 
 /// Draws the places within reach, if there is no route.
@@ -188,5 +188,5 @@ fn paint_reach(
     let storeys = map.storeys(avatar).map_err(|cause| failed(cause.into()))?;
     let others = [(args.to.0, "goal"), (nearest, "nearest")];
     let marks = Marks { start: start.position(map.grid()), others: &others };
-    paint(map, avatar, &storeys, &reach, &marks).save(path)
+    output::save_picture(&paint(map, avatar, &storeys, &reach, &marks), path)
 }

@@ -3,10 +3,10 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::slices::{Avatar, AvatarOptions, SliceMap};
+use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE};
+use nearmiss_draw::picture::Picture;
 
 use super::labels::Labels;
-use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
-use crate::image::Picture;
 use crate::picture::scale_bar;
 
 /// Sizes in fine pixels: the longer side of a single view and of one of several; the least width;

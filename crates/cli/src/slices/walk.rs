@@ -122,7 +122,7 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
         let (map, faults) = folder.load_all();
         faults.iter().for_each(console::warn);
         let floors = map.storeys(&avatar).unwrap_or_default();
-        walk_picture::paint(&map, track, &avatar, &floors).save(path)?;
+        output::save_picture(&walk_picture::paint(&map, track, &avatar, &floors), path)?;
     }
     if !args.json {
         let mut results = Results::new();

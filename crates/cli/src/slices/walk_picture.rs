@@ -2,6 +2,8 @@
 //! height over its length.
 
 use nearmiss::slices::{Avatar, AvatarOptions, SliceMap, Storey};
+use nearmiss_draw::canvas::{Area, Canvas, Colour, FINE};
+use nearmiss_draw::picture::Picture;
 
 use super::labels::Labels;
 use super::storey_view::{
@@ -9,9 +11,7 @@ use super::storey_view::{
     window,
 };
 use super::track::Track;
-use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::digits::{rounded, short};
-use crate::image::Picture;
 
 /// Height of the curve, in fine pixels.
 const CURVE: usize = 210 * FINE;
@@ -294,7 +294,7 @@ mod tests {
             paint(&map, &track, &avatar, &[])
         };
         let count = |picture: &Picture, colour: Colour| {
-            picture.pixels().chunks(3).filter(|pixel| *pixel == colour).count()
+            picture.pixels.chunks(3).filter(|pixel| *pixel == colour).count()
         };
         let way: Vec<[f64; 3]> = (0..20_u8).map(|i| [0.5 + 0.05 * f64::from(i), 2.0, 0.0]).collect();
         // The legend has a patch of either colour.
@@ -307,7 +307,7 @@ mod tests {
         for (far, is_right) in [([30.0, 2.0], true), ([-30.0, 2.0], false)] {
             let picture = shown(&way, &[far], false);
             let (width, height) = picture.size();
-            let rows = picture.pixels().chunks(3 * width).take(height / 3);
+            let rows = picture.pixels.chunks(3 * width).take(height / 3);
             let half = |row: &[u8]| {
                 let row =
                     if is_right { row[3 * (width / 2)..].to_vec() } else { row[..3 * (width / 2)].to_vec() };
@@ -320,8 +320,7 @@ mod tests {
         let empty = shown(&way[..1], &[], false);
         // The patch of the legend is below the drawing, in the last rows.
         let (width, height) = empty.size();
-        let drawn =
-            empty.pixels().chunks(3).take(width * (height - 60)).filter(|pixel| *pixel == WAY).count();
+        let drawn = empty.pixels.chunks(3).take(width * (height - 60)).filter(|pixel| *pixel == WAY).count();
         assert!((2..40).contains(&drawn), "{drawn} pixels of the dot at the start");
         let uneven: Vec<[f64; 3]> =
             way.iter().zip(0_u8..).map(|(p, i)| [p[0], p[1], 0.01 * f64::from(i % 2)]).collect();
@@ -336,7 +335,7 @@ mod tests {
         let track = track(&places, &[[1.45, 2.0]], map.grid());
         let picture = paint(&map, &track, &Avatar::new(&AvatarOptions::default()).unwrap(), &[]);
         let share = |colour: Colour| {
-            let all = picture.pixels().chunks(3);
+            let all = picture.pixels.chunks(3);
             #[expect(clippy::cast_precision_loss, reason = "pixels")]
             let share = all.clone().filter(|pixel| *pixel == colour).count() as f64 / all.len() as f64;
             share

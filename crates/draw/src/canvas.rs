@@ -1,10 +1,10 @@
 //! A canvas of pixels with depth. Paints discs and balls under an orthographic camera, with lines,
 //! rings and letters over them.
 
-use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::font;
-use crate::image::Picture;
+use crate::picture::Picture;
 
 /// Red, green, blue.
 pub type Colour = [u8; 3];
@@ -27,24 +27,27 @@ pub struct Area {
 
 /// An orthographic camera for an area of the canvas.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Camera {
+pub struct Camera {
     /// Unit directions: to the right, up, and towards the viewer.
-    pub(crate) axes: [Vector3<f64>; 3],
+    pub axes: [Vector3<f64>; 3],
     /// The point shown in the middle of the area.
-    pub(crate) centre: Vector3<f64>,
+    pub centre: Vector3<f64>,
     /// Fine pixels per unit of length.
-    pub(crate) scale: f64,
-    pub(crate) area: Area,
+    pub scale: f64,
+    /// The part of the canvas that shows the view.
+    pub area: Area,
 }
 
 impl Camera {
     /// Returns the components of a direction or offset: to the right, up and towards the viewer.
-    pub(crate) fn turn(&self, v: Vector3<f64>) -> [f64; 3] {
+    #[must_use]
+    pub fn turn(&self, v: Vector3<f64>) -> [f64; 3] {
         self.axes.map(|axis| axis.dot(&v))
     }
 
     /// Returns column, row, and nearness to the viewer, in fine pixels.
-    pub(crate) fn project(&self, p: Vector3<f64>) -> [f64; 3] {
+    #[must_use]
+    pub fn project(&self, p: Vector3<f64>) -> [f64; 3] {
         let [x, y, z] = self.turn(p - self.centre);
         [self.middle(0) + self.scale * x, self.middle(1) - self.scale * y, self.scale * z]
     }
@@ -59,10 +62,13 @@ impl Camera {
 
 /// A disc in the world.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Splat {
-    pub(crate) centre: Vector3<f64>,
-    pub(crate) normal: Vector3<f64>,
-    pub(crate) radius: f64,
+pub struct Splat {
+    /// The centre.
+    pub centre: Vector3<f64>,
+    /// The unit normal, of either sign.
+    pub normal: Vector3<f64>,
+    /// The radius, in units of the world.
+    pub radius: f64,
 }
 
 /// Direction to the light, over the viewer's left shoulder: right, up, towards the viewer.
@@ -107,7 +113,7 @@ impl Canvas {
     }
 
     /// Paints a lit disc, hidden by anything nearer to the viewer.
-    pub(crate) fn splat(&mut self, camera: &Camera, splat: &Splat, colour: Colour) {
+    pub fn splat(&mut self, camera: &Camera, splat: &Splat, colour: Colour) {
         let [x, y, z] = camera.project(splat.centre);
         let n = camera.turn(splat.normal);
         let lambert = (0..3).map(|k| n[k] * LIGHT[k]).sum::<f64>().abs();
@@ -133,7 +139,7 @@ impl Canvas {
     }
 
     /// Paints a lit ball, hidden by anything nearer to the viewer.
-    pub(crate) fn ball(&mut self, camera: &Camera, centre: Vector3<f64>, radius: f64, colour: Colour) {
+    pub fn ball(&mut self, camera: &Camera, centre: Vector3<f64>, radius: f64, colour: Colour) {
         let [x, y, z] = camera.project(centre);
         let radius = camera.scale * radius;
         let (columns, rows) = pixels_about(camera.area, [x, y], radius);
@@ -158,12 +164,13 @@ impl Canvas {
     }
 
     /// Returns width and height in fine pixels.
-    pub(crate) fn size(&self) -> (usize, usize) {
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
     /// Blends the painted pixels of `other`, a canvas of the same size, over `area` of this one.
-    pub(crate) fn veil(&mut self, other: &Self, area: Area, opacity: f64) {
+    pub fn veil(&mut self, other: &Self, area: Area, opacity: f64) {
         for y in area.top..area.top + area.height {
             let row = y * self.width + area.left..y * self.width + area.left + area.width;
             for i in row.filter(|&i| other.depth[i] > f64::NEG_INFINITY) {
@@ -206,14 +213,7 @@ impl Canvas {
 
     /// Draws the visible parts of a line. Something hides a part only if it is nearer to the viewer
     /// by more than `lift`, a length in the world.
-    pub(crate) fn edge(
-        &mut self,
-        camera: &Camera,
-        ends: [Vector3<f64>; 2],
-        width: f64,
-        colour: Colour,
-        lift: f64,
-    ) {
+    pub fn edge(&mut self, camera: &Camera, ends: [Vector3<f64>; 2], width: f64, colour: Colour, lift: f64) {
         let [from, to] = ends.map(|end| camera.project(end));
         let [start, end] = [[from[0], from[1]], [to[0], to[1]]];
         let length = distance(start, end);
@@ -235,7 +235,7 @@ impl Canvas {
     }
 
     /// Draws a circle with lines of the given width.
-    pub(crate) fn ring(&mut self, area: Area, centre: [f64; 2], radius: f64, width: f64, colour: Colour) {
+    pub fn ring(&mut self, area: Area, centre: [f64; 2], radius: f64, width: f64, colour: Colour) {
         self.overlay(area, centre, radius + width, colour, |p| {
             0.5 * width - (distance(p, centre) - radius).abs() + 0.5
         });
@@ -311,7 +311,9 @@ fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
     (p[0] - q[0]).hypot(p[1] - q[1])
 }
 
-pub(crate) fn shade(colour: Colour, light: f64) -> Colour {
+/// Returns `colour` under a share of the light, from 0 (black) to 1.
+#[must_use]
+pub fn shade(colour: Colour, light: f64) -> Colour {
     blend([0; 3], colour, light.clamp(0.0, 1.0))
 }
 

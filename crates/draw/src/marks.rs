@@ -1,17 +1,19 @@
 //! Marks over a painted view: titles, scale bars, marked places, arrows, frames.
 
-use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
 use crate::font;
-use crate::units::WorldUnit;
 
-pub(crate) const GROUND: Colour = [255, 255, 255];
-pub(crate) const PANEL_GROUND: Colour = [238, 240, 243];
-pub(crate) const INK: Colour = [30, 34, 40];
+/// The colour of the space about panels, and of what is behind letters.
+pub const GROUND: Colour = [255, 255, 255];
+/// The colour of a panel on which nothing is painted.
+pub const PANEL_GROUND: Colour = [238, 240, 243];
+/// The colour of letters and lines.
+pub const INK: Colour = [30, 34, 40];
 
 /// Width of the white border on each side of a line, which sets it off from the background.
-pub(crate) const HALO: f64 = 3.0;
+pub const HALO: f64 = 3.0;
 
 /// Size of letters; see [`Canvas::text`].
 const LETTERS: usize = 2 * FINE;
@@ -24,7 +26,7 @@ const MARGIN: usize = 8 * FINE;
 
 /// Writes `text` on a background whose upper left corner is at `[left, top]`, moved into `area` if
 /// necessary. Returns the area of the background.
-pub(crate) fn label(canvas: &mut Canvas, area: Area, [left, top]: [f64; 2], text: &str) -> Area {
+pub fn label(canvas: &mut Canvas, area: Area, [left, top]: [f64; 2], text: &str) -> Area {
     let text = font::elided(LETTERS, text, area.width.saturating_sub(2 * PAD));
     let (width, height) = label_size(&text);
     #[expect(
@@ -45,19 +47,20 @@ pub(crate) fn label(canvas: &mut Canvas, area: Area, [left, top]: [f64; 2], text
 }
 
 /// Returns the width and height of the background of a [`label`].
-pub(crate) fn label_size(text: &str) -> (usize, usize) {
+#[must_use]
+pub fn label_size(text: &str) -> (usize, usize) {
     (Canvas::text_width(LETTERS, text) + 2 * PAD, font::LINE * LETTERS + 2 * PAD)
 }
 
 /// Writes the title of a panel into its upper left corner.
-pub(crate) fn title(canvas: &mut Canvas, area: Area, text: &str) {
+pub fn title(canvas: &mut Canvas, area: Area, text: &str) {
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let corner = [area.left + MARGIN, area.top + MARGIN].map(|c| c as f64);
     label(canvas, area, corner, text);
 }
 
 /// Marks a place by a ring and four lines that point to it.
-pub(crate) fn mark(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, size: f64) {
+pub fn mark(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, size: f64) {
     let [x, y, _] = camera.project(point);
     let fine = 2.0 * size;
     for (width, colour) in [(fine * 1.2 + 2.0 * HALO, GROUND), (fine * 1.2, INK)] {
@@ -70,13 +73,7 @@ pub(crate) fn mark(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, si
 }
 
 /// Draws an arrow from the point `from` along the vector `along`.
-pub(crate) fn arrow(
-    canvas: &mut Canvas,
-    camera: &Camera,
-    from: Vector3<f64>,
-    along: Vector3<f64>,
-    colour: Colour,
-) {
+pub fn arrow(canvas: &mut Canvas, camera: &Camera, from: Vector3<f64>, along: Vector3<f64>, colour: Colour) {
     let [[x, y, _], [u, v, _]] = [from, from + along].map(|p| camera.project(p));
     let length = (u - x).hypot(v - y).max(1.0);
     let [dx, dy] = [(u - x) / length, (v - y) / length];
@@ -91,7 +88,7 @@ pub(crate) fn arrow(
 
 /// Draws a square around the part that a close view shows, `reach` to every side of `point`.
 /// Returns `false` without drawing if the square would be too small to see.
-pub(crate) fn frame(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, reach: f64) -> bool {
+pub fn frame(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, reach: f64) -> bool {
     let [x, y, _] = camera.project(point);
     let half = camera.scale * reach;
     if half < 40.0 {
@@ -107,19 +104,14 @@ pub(crate) fn frame(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, r
     true
 }
 
-/// Draws a scale bar for lengths in the unit of the file.
-pub(crate) fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
-    scale_bar_in(canvas, camera, WorldUnit::OfFile);
-}
-
 /// Draws a scale bar into the lower left corner. Its length is 1, 2 or 5 times a power of ten, and
-/// an eighth to a third of the panel's height.
-pub(crate) fn scale_bar_in(canvas: &mut Canvas, camera: &Camera, unit: WorldUnit) {
+/// an eighth to a third of the panel's height. `told` says how long it is.
+pub fn scale_bar(canvas: &mut Canvas, camera: &Camera, told: impl Fn(f64) -> String) {
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let longest = camera.area.height as f64 / 3.0 / camera.scale;
     let power = 10.0_f64.powf(longest.log10().floor());
     let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|&l| l <= longest).unwrap_or(power);
-    let text = unit.scale(length);
+    let text = told(length);
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

@@ -5,11 +5,11 @@ use std::sync::LazyLock;
 use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont, point};
 
 /// Height of a capital letter, as a multiple of the letter size.
-pub(crate) const CAPITAL: usize = 7;
+pub const CAPITAL: usize = 7;
 
 /// Height of a line of letters from the top of capitals to the lowest descender, as a multiple of
 /// the letter size.
-pub(crate) const LINE: usize = 9;
+pub const LINE: usize = 9;
 
 /// Widening of the strokes, as a share of the letter size. The face is light, and pictures are
 /// often shown reduced.
@@ -58,7 +58,7 @@ impl Face {
 /// covers; some pixels are visited more than once. Columns count from the left end of the first
 /// letter, rows from the top of capital letters. Pixels of accents have negative rows, and those of
 /// overhangs negative columns.
-pub(crate) fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32)) {
+pub fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32)) {
     let Some(face) = &*FACE else { return };
     let scale = face.scale(size);
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
@@ -81,7 +81,8 @@ pub(crate) fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32
 }
 
 /// Returns the width of a line of letters, in whole pixels.
-pub(crate) fn width(size: usize, text: &str) -> usize {
+#[must_use]
+pub fn width(size: usize, text: &str) -> usize {
     let width = FACE.as_ref().map_or(0.0, |face| face.lay_out(size, text, |_, _| ()));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
     let width = width.ceil() as usize;
@@ -90,7 +91,8 @@ pub(crate) fn width(size: usize, text: &str) -> usize {
 
 /// Returns `text` if it fits into `most` pixels. Otherwise, returns as much of its start and end as
 /// fits, with an ellipsis in between.
-pub(crate) fn elided(size: usize, text: &str, most: usize) -> String {
+#[must_use]
+pub fn elided(size: usize, text: &str, most: usize) -> String {
     if width(size, text) <= most {
         return text.to_owned();
     }

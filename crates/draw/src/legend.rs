@@ -4,10 +4,10 @@ use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::font;
 
 /// Size of letters; see [`Canvas::text`].
-pub(crate) const LETTERS: usize = 2 * FINE;
+pub const LETTERS: usize = 2 * FINE;
 
 /// Height of a line, in fine pixels.
-pub(crate) const LINE: usize = 26 * FINE;
+pub const LINE: usize = 26 * FINE;
 
 const INK: Colour = [30, 34, 40];
 const PATCH: usize = font::CAPITAL * LETTERS;
@@ -18,7 +18,7 @@ const SPACE: usize = 26 * FINE;
 
 /// Writes entries beside each other from `[left, top]`, `width` wide at most. An entry with a
 /// colour has a patch of it in front. The longest entries are shortened until all fit.
-pub(crate) fn entries(
+pub fn entries(
     canvas: &mut Canvas,
     [mut left, top]: [usize; 2],
     width: usize,
@@ -40,7 +40,7 @@ pub(crate) fn entries(
 }
 
 /// Writes a sentence from `[left, top]`, shortened to `width`.
-pub(crate) fn sentence(canvas: &mut Canvas, [left, top]: [usize; 2], width: usize, text: &str) {
+pub fn sentence(canvas: &mut Canvas, [left, top]: [usize; 2], width: usize, text: &str) {
     canvas.text([left, top], LETTERS, INK, &font::elided(LETTERS, text, width));
 }
 
@@ -84,7 +84,7 @@ mod tests {
         let picture = canvas.picture();
         let (width, _) = picture.size();
         let written = |x: usize| {
-            picture.pixels().chunks(3 * width).any(|row| row[3 * x..3 * x + 3].iter().any(|&c| c < 200))
+            picture.pixels.chunks(3 * width).any(|row| row[3 * x..3 * x + 3].iter().any(|&c| c < 200))
         };
         let last = (0..width).rev().find(|&x| written(x)).unwrap();
         assert!((840 / FINE..=920 / FINE).contains(&last), "{last}");
