@@ -91,11 +91,11 @@ fn docs() -> Outcome {
     crate::repository::run(&mut command, "cargo doc")
 }
 
-/// Checks each crate alone, with its default features and with none.
+/// Lints each crate alone, with its default features and with none.
 fn features() -> Outcome {
     for member in members()?.iter().filter(|member| member.published) {
         for features in [&["--quiet"][..], &["--quiet", "--no-default-features"]] {
-            run_cargo(&[&["check", "-p", &member.name], features].concat())?;
+            run_cargo(&[&["clippy", "-p", &member.name], features, &["--", "-D", "warnings"]].concat())?;
         }
     }
     Ok(())

@@ -50,6 +50,7 @@ impl Sink {
     }
 
     /// Sets the scanner positions.
+    #[cfg(feature = "e57")]
     pub(crate) fn with_scanners(self, scanners: Vec<Scanner>) -> Self {
         Self { scanners, ..self }
     }
@@ -72,6 +73,7 @@ impl Sink {
     }
 
     /// Adds triangles, given by the indices of their corners.
+    #[cfg(feature = "gltf")]
     pub(crate) fn triangles(&mut self, triangles: &[[u32; 3]]) {
         self.triangles.extend_from_slice(triangles);
     }

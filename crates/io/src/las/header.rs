@@ -13,6 +13,7 @@ pub(super) const LONGEST: usize = 375;
 const SHORTEST: usize = 227;
 
 /// Length of the header of a variable-length record in bytes.
+#[cfg(feature = "laz")]
 const RECORD: usize = 54;
 
 /// Length of a point record in bytes, for each point format, without extra bytes.
@@ -162,6 +163,7 @@ impl Header {
 
 /// Finds the variable-length record with this user id and record id. Returns its offset and
 /// content. `head` is the part of the file before the points.
+#[cfg(feature = "laz")]
 pub(super) fn record<'a>(head: &'a [u8], header: &Header, user: &[u8], id: u16) -> Option<(usize, &'a [u8])> {
     let mut at = header.header_size.max(SHORTEST);
     // Ends at the end of `head`, whatever number the header declares.
