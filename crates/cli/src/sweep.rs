@@ -4,14 +4,16 @@ mod picture;
 mod report;
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use nearmiss::{
-    Budget, Deadline, Motion, MotionError, Prepared, Scan, Scratch, Sweep, SweepOptions, SweepPlan,
+    Budget, Deadline, MeshScanSweep, Motion, MotionError, PlanError, Pose, Prepared, Scan, Scratch, Sweep,
+    SweepAnswer, SweepOptions, SweepPlan, SweepVerdict,
 };
 
-use crate::bodies::Bodies;
+use crate::as_mesh::AsMeshName;
+use crate::bodies::{Bodies, swap};
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -19,7 +21,6 @@ use crate::meaning::MeaningArgs;
 use crate::parse::{parse_duration, parse_radius};
 use crate::posing::{PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
-use crate::sentence::unit;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture as scans_picture};
 use report::Report;
@@ -49,6 +50,9 @@ pub struct SweepArgs {
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
+    /// Compare the triangles of this input instead of its points
+    #[arg(long, value_enum, value_name = "WHICH")]
+    pub as_mesh: Option<AsMeshName>,
     /// Time limit for the whole motion, such as 50ms
     ///
     /// The unit is ns, us, ms or s. What is proven by then is told.
@@ -77,40 +81,40 @@ pub struct SweepArgs {
 }
 
 pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
+    if let Some(which) = args.as_mesh {
+        which.refuse(&[("--image", args.image.is_some())])?;
+        if which == AsMeshName::Both {
+            let what = "--as-mesh both: expected at least one scan, got two meshes; put points on one of them with \
+                        `nearmiss sample`";
+            return Err(CliError::Usage(what.into()));
+        }
+    }
     let console = Console::new(args.quiet);
+    let inputs = args.pair.inputs();
     if let Some(path) = &args.image {
-        let mut inputs = args.pair.inputs().to_vec();
-        inputs.push(&args.path);
-        output::check_apart(path, &inputs)?;
+        output::check_apart(path, &[inputs[0], inputs[1], &args.path])?;
         scans_picture::check_name(path)?;
     }
     let mut poses = args.pair.path_file(&args.path)?;
     let opening = args.pair.opening(args.threads, console);
-    let inputs = args.pair.inputs();
-    let scans = if args.meaning.thickened.is_some() {
-        opening.open_points(inputs)?
-    } else {
-        opening.open_both(args.kernel.map(KernelName::metric), inputs)?
+    let kernel = args.kernel.map(KernelName::metric);
+    let bodies = match args.as_mesh {
+        Some(which) => opening.open_mesh_and_scan(which, kernel, inputs)?,
+        None if args.meaning.thickened.is_some() => Bodies::Scans(opening.open_points(inputs)?),
+        None => Bodies::Scans(opening.open_both(kernel, inputs)?),
     };
-    let plan = SweepPlan::new(&options(args, &scans[0]), &scans[0], &scans[1])?;
-    let bodies = Bodies::Scans(scans);
     let motions = read_motions(&mut poses, &bodies)?;
-    let Bodies::Scans(scans) = &bodies else { return Ok(()) };
-    let moving = [scans[0].along(&motions[0]), scans[1].along(&motions[1])];
-    let first = moving.map(|moving| moving.at(0.0));
-    args.pair.size_check(console).compare(first.each_ref());
-
-    let bar = console.spinner(format_args!("sweeping {} steps", motions[1].duration()));
+    let plan = plan(&options(args, bodies.scan()), &bodies)?;
+    let first = bodies.at(&motions.each_ref().map(|motion| motion.at(0.0)));
+    first.compare_sizes(&args.pair.size_check(console));
+    let duration = motions[0].duration().max(motions[1].duration());
+    let bar = console.spinner(format_args!("sweeping {duration} steps"));
     let start = now();
-    let mut budget = Budget::UNLIMITED;
-    (budget.work, budget.deadline) =
-        (args.work, args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
-    let sweep = Sweep::new(moving[0], moving[1]).within(&budget);
-    let answer = sweep.first_impact(&plan, &mut Scratch::default());
+    let answer = sweep(&bodies, &motions, &plan, &budget(args, start));
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
     drop(bar);
-    if let Some(path) = &args.image {
+    if let (Some(path), Bodies::Scans([a, b])) = (&args.image, &bodies) {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let style = scans_picture::Style {
             names: scans_picture::names(inputs),
@@ -118,18 +122,55 @@ pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
             view: args.view,
             unit: args.pair.world_unit(),
         };
+        let moving = [a.along(&motions[0]), b.along(&motions[1])];
         picture::paint(moving, &plan, &answer, &style).save(path)?;
         drop(bar);
     }
     let mut results = Results::new();
-    let report = Report::new(&answer, motions[0].duration().max(motions[1].duration()), micros);
+    let report = Report::new(&answer, duration, micros);
     if args.json {
         results.json(&report)?;
     } else {
-        results.line(report.sentence(&answer, args.clearance, unit(first.each_ref())))?;
+        results.line(report.sentence(&answer, args.clearance, first.unit()))?;
         results.line(report.details())?;
     }
     results.flush()
+}
+
+/// Returns the budget of a sweep that starts at `start`.
+fn budget(args: &SweepArgs, start: Instant) -> Budget {
+    let mut budget = Budget::UNLIMITED;
+    (budget.work, budget.deadline) =
+        (args.work, args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
+    budget
+}
+
+/// Validates the options.
+fn plan(options: &SweepOptions, bodies: &Bodies) -> Result<SweepPlan, PlanError> {
+    match bodies {
+        Bodies::Scans([a, b]) => SweepPlan::new(options, a, b),
+        Bodies::MeshAndScan { scan, .. } => SweepPlan::against_mesh(options, scan),
+    }
+}
+
+/// Answers the question.
+fn sweep(bodies: &Bodies, motions: &[Motion; 2], plan: &SweepPlan, budget: &Budget) -> SweepAnswer {
+    let scratch = &mut Scratch::default();
+    match bodies {
+        Bodies::Scans([a, b]) => {
+            Sweep::new(a.along(&motions[0]), b.along(&motions[1])).within(budget).first_impact(plan, scratch)
+        }
+        Bodies::MeshAndScan { mesh, scan, mesh_is_a } => {
+            let of_mesh = usize::from(!mesh_is_a);
+            let moving = scan.along(&motions[1 - of_mesh]);
+            let sweep = MeshScanSweep::new(moving, mesh, &motions[of_mesh]).within(budget);
+            let mut answer = sweep.first_impact(plan, scratch);
+            if let (true, SweepVerdict::Impact { contact, .. }) = (mesh_is_a, &mut answer.verdict) {
+                swap(contact);
+            }
+            answer
+        }
+    }
 }
 
 /// Returns the options of a sweep. `a` is the first scan.
@@ -146,7 +187,7 @@ fn read_motions(poses: &mut PoseFile, bodies: &Bodies) -> Result<[Motion; 2], Cl
         of_a.push(a);
         of_b.push(b);
     }
-    let motion = |name: &str, of: &[nearmiss::Pose]| {
+    let motion = |name: &str, of: &[Pose]| {
         Motion::through(of).map_err(|refused| {
             let index = match refused {
                 MotionError::NotFinite { index } | MotionError::Scale { index, .. } => index,

@@ -161,8 +161,11 @@ fn view(
     };
     let scan = b.at(0.0).scan();
     let at_key = Placed::new(scan, &nearest.pose);
-    let step = (samples.len() - 1).div_ceil(SHOWN).max(1);
-    let shown: Vec<&Sample> = samples.iter().step_by(step).chain([nearest]).collect();
+    // After an impact b is inside a.
+    let last = if answer.verdict.is_impact() { key } else { f64::INFINITY };
+    let count = samples.iter().take_while(|sample| sample.time <= last).count();
+    let evenly = (0..=SHOWN).filter_map(|i| samples.get(i * count.saturating_sub(1) / SHOWN));
+    let shown: Vec<&Sample> = evenly.chain([nearest]).collect();
     let corners = |sample: &&Sample| scan.bounds().corners().map(|corner| sample.pose.apply(corner).into());
     let places: Vec<Vector3<f64>> = shown.iter().flat_map(corners).collect();
     let hides = |points: &[Vector3<f64>], toward: &Vector3<f64>| hidden(points, &shown, *toward);

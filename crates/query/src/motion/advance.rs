@@ -2,7 +2,9 @@
 //!
 //! The distance to prove is chosen by distance queries: half the lower bound at the start, and less
 //! where the proof stalls, down to the clearance that was asked for. So the proof of a free motion
-//! also tells by how much it is free, and a step of the proof is as long as the distance allows.
+//! also tells by how much it is free, and a step of the proof is as long as the distance allows. A
+//! second proof, of a greater share of the least distance that the first one met, then finds where
+//! the motion is tightest.
 
 use nearmiss_geometry::{Motion, Pose, Screw};
 use nearmiss_hierarchy::{Ball, NodePair, Stack};
@@ -17,8 +19,9 @@ use crate::ask::budget::Budget;
 use crate::contact::collide::ContactScratch;
 use crate::distance::{Distance, Frontier};
 
-/// The share of the lower bound of a measured distance that is proven for the times around it.
-const SHARE: f64 = 0.5;
+/// The shares of the lower bound of a measured distance that are proven for the times around it, by
+/// the first and by the second proof.
+const SHARES: [f64; 2] = [0.5, 0.75];
 
 /// Excesses over the clearance below this many bands are not worth a proof of their own.
 const WORTH: f64 = 0.5;
@@ -46,6 +49,8 @@ pub(crate) struct Nearest {
     pub(crate) upper: f64,
     pub(crate) at: f64,
     pub(crate) band: f64,
+    /// The least of all lower bounds.
+    lower: f64,
 }
 
 /// The reason for which a proof ends early.
@@ -72,8 +77,12 @@ pub(crate) struct Sweeping<'s, C> {
     budget: &'s Budget,
     scratch: SweepScratch<'s>,
     balls: [Ball; 2],
-    /// The distance that is being proven; at least the clearance.
+    /// The distance that is being proven.
     pub(crate) proving: f64,
+    /// The least distance that is worth a proof: the clearance, or what is proven already.
+    least: f64,
+    /// The share of a lower bound that is proven.
+    share: f64,
     pub(crate) nearest: Nearest,
     /// The nearest items of the last distance query.
     items: [usize; 2],
@@ -98,7 +107,9 @@ impl<'s, C: Course> Sweeping<'s, C> {
             scratch,
             balls: course.balls(),
             proving: f64::INFINITY,
-            nearest: Nearest { upper: f64::INFINITY, at: 0.0, band: f64::INFINITY },
+            least: plan.options().clearance,
+            share: SHARES[0],
+            nearest: Nearest { upper: f64::INFINITY, at: 0.0, band: f64::INFINITY, lower: f64::INFINITY },
             items: [0; 2],
             distances: 0,
             contacts: 0,
@@ -141,13 +152,14 @@ impl<'s, C: Course> Sweeping<'s, C> {
         let found = self.course.distance(poses, self.plan, &budget, &mut self.items, (open, contact));
         self.distances += 1;
         self.spend(&found.statistics);
+        let lower = self.nearest.lower.min(found.lower);
         if found.upper < self.nearest.upper {
-            self.nearest = Nearest { upper: found.upper, at: time, band: found.band };
+            self.nearest = Nearest { upper: found.upper, at: time, band: found.band, lower };
         }
-        let clearance = self.plan.options().clearance;
-        let next = (SHARE * found.lower).min(SHARE * self.proving);
-        let is_worth = next > clearance + WORTH * found.band;
-        self.proving = if is_worth { next } else { clearance };
+        self.nearest.lower = lower;
+        let next = (self.share * found.lower).min(self.share * self.proving);
+        let is_worth = next > self.least + WORTH * found.band;
+        self.proving = if is_worth { next } else { self.least };
         found
     }
 
@@ -173,11 +185,26 @@ impl<'s, C: Course> Sweeping<'s, C> {
     /// Proves the whole motion. Otherwise returns the time up to which it is proven, and the reason
     /// why the proof ends.
     pub(crate) fn prove(&mut self) -> Result<(), (f64, Stop)> {
-        let poses = self.screws(0).each_ref().map(Screw::start).map(|pose| *pose);
+        let poses = self.screws(0).map(|screw| *screw.start());
         let first = self.measure(0.0, &poses);
         if first.band == f64::INFINITY {
             return Err((0.0, Stop::Ended(SweepReason::Pose)));
         }
+        self.prove_all()
+    }
+
+    /// Proves a greater distance of a motion that is proven to be free, if there is one.
+    pub(crate) fn tighten(&mut self) {
+        self.share = SHARES[1];
+        (self.least, self.proving) = (self.proving, self.share * self.nearest.lower);
+        let is_worth = self.proving > self.least + WORTH * self.nearest.band;
+        if !is_worth || self.prove_all().is_err() {
+            self.proving = self.least;
+        }
+    }
+
+    /// Proves the distance that is to be proven for the whole motion, or less where it stalls.
+    fn prove_all(&mut self) -> Result<(), (f64, Stop)> {
         let duration = self.duration();
         let (mut k, mut time) = (0, 0.0);
         loop {
@@ -213,7 +240,7 @@ impl<'s, C: Course> Sweeping<'s, C> {
                     self.scratch.motion.parts.push(TimeSpan { from: middle, pairs, ..part });
                     self.scratch.motion.parts.push(TimeSpan { to: middle, pairs, ..part });
                 }
-                Ok(_) if self.proving > self.plan.options().clearance => {
+                Ok(_) if self.proving > self.least => {
                     self.measure(time + middle, &poses);
                     self.scratch.motion.parts.push(part);
                 }

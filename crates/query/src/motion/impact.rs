@@ -24,6 +24,7 @@ pub(crate) fn sweep<C: Course>(
     let verdict = if plan.proves() {
         match sweeping.prove() {
             Ok(()) => {
+                sweeping.tighten();
                 let (clearance, nearest) = (sweeping.proving, sweeping.nearest);
                 SweepVerdict::Free { clearance, upper: nearest.upper, at: nearest.at }
             }

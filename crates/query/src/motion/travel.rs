@@ -23,10 +23,10 @@ pub(crate) struct Travel {
     velocity: Vector3<f64>,
     /// The relative angular velocity.
     turn: Vector3<f64>,
-    /// The part of the speed by which the velocity of a point changes within the interval, as it
-    /// moves to other places.
+    /// The change of the speed of a point within the interval, as it moves to other places. Seen
+    /// from a still a, each point of b has a constant speed.
     drift: f64,
-    /// The length of the way of b's points in the world.
+    /// A bound on the way of b's points in the world if a moves; 0 if it does not.
     own: f64,
     /// The angle by which a turns.
     turn_of_a: f64,
@@ -50,20 +50,22 @@ impl Travel {
         let turns = [a, b].map(|screw| Vector3::from(screw.turn()));
         let turn = turns[1] - turns[0];
         let is_still = |screw: &Screw| of(screw) == Vector3::zeros() && screw.turn() == [0.0; 3];
-        // Seen from a still a, each point of b has a constant speed.
         let own_speed = of(b).norm() + turns[1].norm() * radius(1);
-        let drift = if is_still(a) || half == 0.0 { 0.0 } else { turn.norm() * half * own_speed };
+        let own = if is_still(a) || half == 0.0 { 0.0 } else { half * own_speed };
         let rounding = |k: usize| {
-            let start = Vector3::from(screws[k].start().translation());
-            start.norm() + at(k).norm() + (at(k) - start).norm() + radius(k)
+            let start = screws[k].start().translation();
+            let shift = Vector3::from(screws[k].velocity(start)).norm();
+            let start = Vector3::from(start);
+            let arms = start.norm() + at(k).norm() + (at(k) - start).norm() + radius(k);
+            (arms + shift) * (1.0 + turns[k].norm())
         };
         Self {
             half,
             place,
             velocity: of(b) - of(a),
             turn,
-            drift,
-            own: half * own_speed,
+            drift: turn.norm() * own,
+            own,
             turn_of_a: half * turns[0].norm(),
             placed: placed.map(|pose| *pose),
             to_stored: ROUNDED_UP / placed[0].scale(),

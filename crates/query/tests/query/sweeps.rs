@@ -3,11 +3,12 @@
 use std::f64::consts::{PI, TAU};
 use std::time::Duration;
 
-use nearmiss_geometry::{Motion, PointCloud, Pose, Screw};
-use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_geometry::{Motion, PointCloud, Pose, Screw, TriangleMesh};
+use nearmiss_hierarchy::{BuildOptions, MeshBuildOptions, MeshHierarchy, PointHierarchy};
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, Deadline, DistanceOptions, DistancePlan, Pair, PlanError, Prepared,
-    Scratch, Semantics, Sweep, SweepAnswer, SweepOptions, SweepPlan, SweepReason, SweepVerdict,
+    Budget, CollideOptions, CollidePlan, Deadline, DistanceOptions, DistancePlan, MeshScanPair, MeshScanPlan,
+    MeshScanSweep, Pair, PlacedMesh, PlanError, Prepared, Scratch, Semantics, Sweep, SweepAnswer,
+    SweepOptions, SweepPlan, SweepReason, SweepVerdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use rand::RngExt;
@@ -382,4 +383,58 @@ fn budgets_end_a_sweep_with_what_is_proven() {
         matches!(answer.verdict, SweepVerdict::Undecided { reason: SweepReason::Budget, .. }),
         "{answer:?}"
     );
+}
+
+#[test]
+fn a_mesh_meets_a_scan_when_it_should() {
+    let scan = sphere(3000, 1.0);
+    let corners = vec![[-3.0, -3.0, 0.0], [3.0, -3.0, 0.0], [3.0, 3.0, 0.0], [-3.0, 3.0, 0.0]];
+    let plate = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+    let plate = MeshHierarchy::build(&plate, &MeshBuildOptions::default()).unwrap();
+    let still = Motion::still(Pose::IDENTITY);
+    let mut scratch = Scratch::default();
+    let falls = through(&[at(0.2, 0.1, 4.0), at(0.2, 0.1, -4.0)]);
+    // Tilts about an axis 2 above the centre; touches when it is 1 from the centre, at 60°.
+    let tilts = through(&[
+        at(0.0, 0.0, 2.0),
+        Pose::from_axis_angle([0.0, 1.0, 0.0], 1.2).with_translation([0.0, 0.0, 2.0]),
+    ]);
+    let slides = through(&[at(-50.0, 0.0, 1.4), at(50.0, 0.0, 1.4)]);
+    let r = scan.sampling_radius();
+    for (semantics, motion, expected) in [
+        (Semantics::Obstacle, &falls, Some(0.375)),
+        (Semantics::Surface, &falls, Some(0.375)),
+        (Semantics::Thickened(0.2), &falls, Some(0.35)),
+        (Semantics::Obstacle, &tilts, Some(PI / 3.0 / 1.2)),
+        (Semantics::Obstacle, &slides, None),
+    ] {
+        let options = SweepOptions::default().with_semantics(semantics);
+        let plan = SweepPlan::against_mesh(&options, &scan).unwrap();
+        let sweep = MeshScanSweep::new(scan.along(&still), &plate, motion);
+        let answer = sweep.first_impact(&plan, &mut scratch);
+        let touching = CollideOptions::estimated().with_semantics(semantics);
+        let touching = MeshScanPlan::new(&touching, &scan).unwrap();
+        let mut check = |end: f64| {
+            for step in 0..300 {
+                let time = end * f64::from(step) / 300.0;
+                let pair =
+                    MeshScanPair::new(scan.at(&Pose::IDENTITY), PlacedMesh::new(&plate, &motion.at(time)));
+                let met = pair.collide(&touching, &mut scratch).verdict;
+                assert!(!met.is_intersecting(), "{semantics:?}: {met:?} at {time}, {answer:?}");
+            }
+        };
+        match (answer.verdict, expected) {
+            (SweepVerdict::Free { clearance, upper, .. }, None) => {
+                check(1.0);
+                assert!(clearance > 0.1 && upper < 0.5 && answer.intervals < 400, "{answer:?}");
+            }
+            (SweepVerdict::Impact { t_free, t_hit, .. }, Some(expected)) => {
+                check(t_free);
+                let speed = if motion == &falls { 8.0 } else { 1.2 * 3.0_f64.sqrt() };
+                assert!((t_hit - expected).abs() * speed < r, "{semantics:?}: {answer:?}, not {expected}");
+                assert!((t_hit - t_free) * speed < 3.0 * r, "{semantics:?}: {answer:?}");
+            }
+            (verdict, expected) => panic!("{semantics:?}: {verdict:?}, not {expected:?}"),
+        }
+    }
 }
