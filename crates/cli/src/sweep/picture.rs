@@ -63,7 +63,7 @@ pub(super) fn paint(
         samples.iter().map(|sample| sample.upper).filter(|upper| upper.is_finite()).fold(0.0, f64::max);
     let area = Area { left: GAP, top: GAP, width: PANEL, height: PANEL };
     canvas.fill(area, PANEL_GROUND);
-    view(&mut canvas, area, (&a, &moving[1]), &samples, (key, highest), answer, style);
+    view(&mut canvas, area, (&a, &moving[1]), &samples, (key, highest), (answer, style));
     let area = Area { left: 2 * GAP + PANEL, ..area };
     canvas.fill(area, PANEL_GROUND);
     plot(&mut canvas, area, &samples, highest, plan.options().clearance, answer);
@@ -152,8 +152,7 @@ fn view(
     (a, b): (&Placed<'_>, &Moving<'_>),
     samples: &[Sample],
     (key, highest): (f64, f64),
-    answer: &SweepAnswer,
-    style: &Style,
+    (answer, style): (&SweepAnswer, &Style),
 ) {
     let Some(nearest) = samples.iter().min_by(|p, q| (p.time - key).abs().total_cmp(&(q.time - key).abs()))
     else {

@@ -84,6 +84,8 @@ pub(crate) struct Sweeping<'s, C> {
     /// The share of a lower bound that is proven.
     share: f64,
     pub(crate) nearest: Nearest,
+    /// The time of the last distance query, and its lower bound.
+    measured: (f64, f64),
     /// The nearest items of the last distance query.
     items: [usize; 2],
     pub(crate) distances: u32,
@@ -110,6 +112,7 @@ impl<'s, C: Course> Sweeping<'s, C> {
             least: plan.options().clearance,
             share: SHARES[0],
             nearest: Nearest { upper: f64::INFINITY, at: 0.0, band: f64::INFINITY, lower: f64::INFINITY },
+            measured: (0.0, 0.0),
             items: [0; 2],
             distances: 0,
             contacts: 0,
@@ -152,6 +155,7 @@ impl<'s, C: Course> Sweeping<'s, C> {
         let found = self.course.distance(poses, self.plan, &budget, &mut self.items, (open, contact));
         self.distances += 1;
         self.spend(&found.statistics);
+        self.measured = (time, found.lower);
         let lower = self.nearest.lower.min(found.lower);
         if found.upper < self.nearest.upper {
             self.nearest = Nearest { upper: found.upper, at: time, band: found.band, lower };
@@ -171,6 +175,25 @@ impl<'s, C: Course> Sweeping<'s, C> {
         self.contacts += 1;
         self.spend(&answer.statistics);
         answer
+    }
+
+    /// The time up to which the last distance query proves the rest of these screws, which start at
+    /// `time`, from `from` on; `from` if it proves nothing.
+    fn clear_until(&self, (time, screws): (f64, &[Screw; 2]), from: f64) -> f64 {
+        let (at, lower) = (self.measured.0 - time, self.measured.1);
+        if !(0.0..=1.0).contains(&at) {
+            return from;
+        }
+        let poses = screws.each_ref().map(|screw| screw.at(at));
+        let stored = self.course.stored(&poses);
+        let travel = Travel::new(screws, 1.0, stored.each_ref(), &self.balls);
+        let [_, ball] = &self.balls;
+        // No point of b moves further than `way` in a unit of time.
+        let way = travel.of_ball(ball.centre, ball.radius);
+        let off = travel.rounding + way * 4.0 * f64::EPSILON * (1.0 + time);
+        let spare = (lower - self.proving - off).max(0.0);
+        let reach = if way > 0.0 { (spare / way).min(1.0) * (1.0 - 1e-9) } else { 0.0 };
+        if from >= at - reach { from.max(at + reach) } else { from }
     }
 
     /// A bound on the speed of any point of b as seen from a, in the world, from the time `within`
@@ -223,7 +246,11 @@ impl<'s, C: Course> Sweeping<'s, C> {
         self.scratch.motion.pairs.push(NodePair::ROOTS);
         self.scratch.motion.parts.clear();
         self.scratch.motion.parts.push(TimeSpan { from: 0.0, to: length, pairs: [0, 1] });
-        while let Some(part) = self.scratch.motion.parts.pop() {
+        while let Some(mut part) = self.scratch.motion.parts.pop() {
+            part.from = self.clear_until((time, screws), part.from);
+            if part.from >= part.to && part.to > 0.0 {
+                continue;
+            }
             let middle = 0.5 * (part.from + part.to);
             let poses = screws.each_ref().map(|screw| screw.at(middle));
             // Pairs past the end belong to parts that are proven.
