@@ -7,8 +7,8 @@ use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
     Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves,
     Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interpolation, ManifoldPoint,
-    Mesh, MeshBuildOptions, MeshScanPair, MeshScanPlan, Method, Pair, Paths, Pose, Scan, Scratch, Semantics,
-    Verdict,
+    Mesh, MeshBuildOptions, MeshScanPair, MeshScanPlan, Method, Motion, Pair, Paths, Pose, Prepared, Scan,
+    Scratch, Semantics, Sweep, SweepOptions, SweepPlan, SweepVerdict, Verdict,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -136,6 +136,29 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     assert_eq!(measure_all().to_bits(), first.to_bits(), "distances depend on the scratch");
     assert_eq!(ALLOCATOR.calls() - before, 0, "distances allocated");
     assert!(first > 100.0 * object.r, "some are apart: {first}");
+
+    let stays = Motion::still(Pose::IDENTITY);
+    let paths: Vec<Motion> = poses.chunks(3).take(40).map(|poses| Motion::through(poses).unwrap()).collect();
+    let mut sweep_all = || {
+        let (mut free, mut sum) = (0, 0.0);
+        for semantics in [Semantics::Obstacle, Semantics::Thickened(0.5 * object.r)] {
+            let plan =
+                SweepPlan::new(&SweepOptions::default().with_semantics(semantics), &scan, &scan).unwrap();
+            for path in &paths {
+                let sweep = Sweep::new(scan.along(&stays), scan.along(path));
+                match sweep.first_impact(&plan, &mut scratch).verdict {
+                    SweepVerdict::Free { clearance, .. } => (free, sum) = (free + 1, sum + clearance),
+                    SweepVerdict::Impact { t_hit, .. } => sum += t_hit,
+                    SweepVerdict::Undecided { t_free, .. } => sum += t_free,
+                }
+            }
+        }
+        (free, sum.to_bits())
+    };
+    let first = sweep_all();
+    let before = ALLOCATOR.calls();
+    assert_eq!(sweep_all(), first, "sweeps depend on the scratch");
+    assert_eq!(ALLOCATOR.calls() - before, 0, "sweeps allocated");
 
     let mesh = Mesh::build(object.mesh.as_ref().unwrap(), &MeshBuildOptions::default()).unwrap();
     let distance = DistancePlan::against_mesh(&DistanceOptions::default(), &scan).unwrap();

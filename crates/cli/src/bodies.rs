@@ -261,7 +261,7 @@ impl<'a> Views<'a> {
 }
 
 /// Exchanges what a contact says about a and b.
-fn swap(contact: &mut Contact) {
+pub(crate) fn swap(contact: &mut Contact) {
     contact.sources.swap(0, 1);
     if let Some(normals) = &mut contact.normals {
         normals.swap(0, 1);

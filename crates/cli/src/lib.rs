@@ -20,6 +20,7 @@ mod preprocess;
 mod proof;
 mod sample;
 mod slices;
+mod sweep;
 mod touch;
 
 mod as_mesh;
@@ -107,6 +108,7 @@ pub use slices::{
     AvatarArgs, AvatarBox, BuildArgs, FloorName, PixelArgs, QueryArgs, ReachArgs, ResponseName, RouteArgs,
     SlicesCommand, SlicesExportArgs, SlicesInspectArgs, Spot, StartArgs, WalkArgs,
 };
+pub use sweep::SweepArgs;
 pub use touch::TouchArgs;
 pub use units::UnitName;
 pub use viewpoint::{Angles, ViewArgs};
@@ -160,6 +162,12 @@ Examples:
   nearmiss animate horse-*.ply
   nearmiss animate horse-*.ply --against wall.nm --rate 30 --json
   nearmiss animate cloth-*.ply --against-frames ball-*.ply --method refit";
+
+const SWEEP_EXAMPLES: &str = "\
+Examples; a line of path.jsonl is {\"b\":[16 numbers]}, or x y z qx qy qz qw:
+  nearmiss sweep room.nm gripper.nm --path path.jsonl
+  nearmiss sweep room.nm gripper.nm --path path.jsonl --clearance 0.02 --image sweep.png
+  nearmiss sweep room.nm gripper.nm --path path.jsonl --json";
 
 const TOUCH_EXAMPLE: &str = "\
 Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} for each shape:
@@ -215,6 +223,9 @@ pub enum Command {
         after_long_help = "Example:\n  nearmiss distance a.nm b.nm --pose-b \"1 0 0 2  0 1 0 0  0 0 1 0  0 0 0 1\""
     )]
     Distance(DistanceArgs),
+    /// Decide whether a whole motion is free, and find the first impact otherwise
+    #[command(after_long_help = SWEEP_EXAMPLES)]
+    Sweep(SweepArgs),
     /// Test spheres, capsules and boxes against the points of a scan
     #[command(after_long_help = TOUCH_EXAMPLE)]
     Touch(TouchArgs),
@@ -253,6 +264,7 @@ impl Command {
             Self::Clash(args) => vec![&args.pair.a, &args.pair.b],
             Self::Curve(args) => vec![&args.pair.a, &args.pair.b],
             Self::Distance(args) => vec![&args.pair.a, &args.pair.b],
+            Self::Sweep(args) => vec![&args.pair.a, &args.pair.b],
             Self::Touch(args) => vec![&args.scan],
             Self::Animate(args) => {
                 let all = args.frames.iter().chain(&args.against_frames).chain(&args.against);
@@ -281,6 +293,7 @@ impl Command {
             Self::Curve(args) => curve::run(args),
             Self::Density(args) => density::run(args),
             Self::Distance(args) => distance::run(args),
+            Self::Sweep(args) => sweep::run(args),
             Self::Touch(args) => touch::run(args),
             Self::Animate(args) => animate::run(args),
             Self::Poses(args) => poses::run(args),

@@ -265,7 +265,7 @@ fn columns(entries: &[PathEntry]) -> (&'static str, Vec<Column>) {
 
 /// Returns a step of 1, 2 or 5 times a power of ten, and the number of steps, 3 to 8, that reach
 /// `highest`.
-fn ticks(highest: f64) -> (f64, u32) {
+pub(crate) fn ticks(highest: f64) -> (f64, u32) {
     if highest <= 0.0 || !highest.is_finite() {
         return (1.0, 1);
     }

@@ -65,12 +65,16 @@ impl PairArgs {
 
     /// Opens the file of poses, if there is one.
     pub(crate) fn pose_file(&self, path: Option<&PathBuf>) -> Result<Option<PoseFile>, CliError> {
-        let Some(path) = path else { return Ok(None) };
+        path.map(|path| self.path_file(path)).transpose()
+    }
+
+    /// Opens a file of poses.
+    pub(crate) fn path_file(&self, path: &Path) -> Result<PoseFile, CliError> {
         let given = |option: &str, given: &Option<String>| {
             given.as_ref().map(|given| from_option(option, Some(given))).transpose()
         };
         let fixed = [given("--pose-a", &self.pose_a)?, given("--pose-b", &self.pose_b)?];
-        PoseFile::open(path, fixed, self.factors().unwrap_or([1.0; 2])).map(Some)
+        PoseFile::open(path, fixed, self.factors().unwrap_or([1.0; 2]))
     }
 
     /// Returns a check that warns about units once if the scans differ too much in size.
@@ -220,6 +224,11 @@ impl PoseFile {
         let watch = console.watch("answering", "poses", move || progress.told(length));
         results.hide(watch.bar());
         watch
+    }
+
+    /// Returns an error about the poses on line `number`.
+    pub(crate) fn fault_on(&self, number: u64, what: impl Into<String>) -> CliError {
+        self.lines.fault_on(number, what)
     }
 
     /// Counts an answered line.

@@ -317,7 +317,7 @@ pub fn shade(colour: Colour, light: f64) -> Colour {
     blend([0; 3], colour, light.clamp(0.0, 1.0))
 }
 
-fn blend(below: Colour, above: Colour, share: f64) -> Colour {
+pub(crate) fn blend(below: Colour, above: Colour, share: f64) -> Colour {
     std::array::from_fn(|k| {
         let mixed = f64::from(below[k]) * (1.0 - share) + f64::from(above[k]) * share;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]

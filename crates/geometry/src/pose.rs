@@ -215,6 +215,12 @@ impl Pose {
         Self { translation: t.into(), ..self }
     }
 
+    /// Replaces the rotation, which must be orthogonal.
+    #[inline]
+    pub(crate) fn with_rotation(self, rotation: Matrix3<f64>) -> Self {
+        Self { rotation, ..self }
+    }
+
     /// Returns the rotation.
     #[inline]
     #[must_use]

@@ -21,6 +21,11 @@ struct Guide;
 #[doc = include_str!("../../../docs/guide/moving.md")]
 struct MovingGuide;
 
+/// The example of the guide about motions compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/motions.md")]
+struct MotionsGuide;
+
 #[cfg(feature = "filter")]
 pub use nearmiss_filter as filter;
 pub use nearmiss_geometry as geometry;
@@ -41,7 +46,9 @@ pub use nearmiss_surface as surface;
 
 pub use moving_mesh::{MovingMesh, Renewal};
 pub use moving_scan::MovingScan;
-pub use nearmiss_geometry::{Aabb, CloudError, Intake, PointCloud, PointId, Pose, PoseError, TriangleMesh};
+pub use nearmiss_geometry::{
+    Aabb, CloudError, Intake, Motion, MotionError, PointCloud, PointId, Pose, PoseError, Screw, TriangleMesh,
+};
 pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{
     BuildError, BuildOptions, DeformError, DeformingMesh, DeformingScan, GatheredPoints, IntakeError,
@@ -53,10 +60,11 @@ pub use nearmiss_query::{
     ClashPlan, Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve,
     CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
     Evidence, Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself,
-    MeshPair, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method,
-    NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedBody, PlacedMesh, PlanError, Prepared,
-    PreparedMesh, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex,
-    Statistics, SurfelSize, Until, Verdict, World, each,
+    MeshPair, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScanSweep, MeshScratch, MeshVerdict,
+    Method, Moving, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedBody, PlacedMesh, PlanError,
+    Prepared, PreparedMesh, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
+    ShapeIndex, Statistics, SurfelSize, Sweep, SweepAnswer, SweepOptions, SweepPlan, SweepReason,
+    SweepVerdict, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -112,6 +112,11 @@ impl DistancePlan {
         &self.touching
     }
 
+    /// The options with an unlimited reach.
+    pub(crate) fn boundless(&self) -> &CollidePlan {
+        &self.boundless
+    }
+
     /// The options that were validated, with the metric of the scans.
     #[must_use]
     pub fn options(&self) -> &DistanceOptions {
@@ -148,21 +153,22 @@ pub struct Distance {
 }
 
 /// Bounds the distance of two scans, with the meaning of `plan`, within `budget`. See
-/// [`Pair::distance`](crate::Pair::distance).
+/// [`Pair::distance`](crate::Pair::distance). Starts from the points `start`, and returns the nearest
+/// ones as well; those of a contact are not returned.
 pub(crate) fn distance(
     views: [&Placed<'_>; 2],
+    start: [usize; 2],
     plan: &DistancePlan,
     budget: &Budget,
-    open: &mut Frontier,
-    contact: &mut ContactScratch,
-) -> Distance {
+    (open, contact): (&mut Frontier, &mut ContactScratch),
+) -> (Distance, [usize; 2]) {
     let [a, b] = views;
     let Ok((pose, relative)) = relative(a, b, &plan.boundless) else {
-        return unknown(views.map(|view| view.point(0)), views.map(|view| view.scan().id(0)));
+        return (unknown(views.map(|view| view.point(0)), views.map(|view| view.scan().id(0))), start);
     };
     let (level, meter) = (contact.level, Meter::new(budget, views, 0));
     let arrays = views.map(|view| view.scan().arrays());
     let part = plan.options.semantics.part();
     let pair = ScanPair::new(views, arrays.each_ref(), relative, meter, (level, part));
-    bound((pair, &pose), [0, 0], plan, budget, (open, contact)).0
+    bound((pair, &pose), start, plan, budget, (open, contact))
 }

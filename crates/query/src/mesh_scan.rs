@@ -1,6 +1,7 @@
 //! Queries of a mesh and a scan: collision, all contacts, distance.
 
 pub(crate) mod collide;
+pub(crate) mod course;
 pub(crate) mod disc_triangle;
 pub(crate) mod distance;
 pub(crate) mod hint;
@@ -10,6 +11,7 @@ pub(crate) mod pair;
 pub(crate) mod pairing;
 pub(crate) mod plan;
 pub(crate) mod search;
+pub(crate) mod sweep;
 pub(crate) mod thickened;
 pub(crate) mod triangle_lanes;
 pub(crate) mod witness;

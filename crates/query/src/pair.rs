@@ -4,6 +4,7 @@ pub(crate) mod bounds;
 pub(crate) mod clearance;
 pub(crate) mod likelihood;
 pub(crate) mod meter;
+pub(crate) mod moving;
 pub(crate) mod pairing;
 pub(crate) mod placed;
 pub(crate) mod placed_balls;

@@ -14,6 +14,7 @@ use crate::contact::hint::PairHint;
 use crate::curve::{CurvePlan, CurveScratch, Curves};
 use crate::distance::{Distance, DistancePlan};
 use crate::mesh::pair::MeshScratch;
+use crate::motion::advance::MotionScratch;
 use crate::pair::placed::Placed;
 use crate::papers::PapersScratch;
 
@@ -29,6 +30,7 @@ pub struct Scratch {
     pub(crate) distance: crate::distance::Frontier,
     curve: CurveScratch,
     meshes: MeshScratch,
+    pub(crate) motion: MotionScratch,
 }
 
 impl Default for Scratch {
@@ -48,6 +50,7 @@ impl Scratch {
             distance: crate::distance::Frontier::default(),
             curve: CurveScratch::default(),
             meshes: MeshScratch::by_level(level),
+            motion: MotionScratch::default(),
         }
     }
 
@@ -198,13 +201,8 @@ impl<'a> Pair<'a> {
     /// (benches/record). Thickened scans that interpenetrate cost a comparison of every pair of
     /// leaves that overlap.
     pub fn distance(&self, plan: &DistancePlan, scratch: &mut Scratch) -> Distance {
-        crate::distance::distance(
-            self.scans.each_ref(),
-            plan,
-            &self.budget,
-            &mut scratch.distance,
-            &mut scratch.contact,
-        )
+        let Scratch { distance: open, contact, .. } = scratch;
+        crate::distance::distance(self.scans.each_ref(), [0, 0], plan, &self.budget, (open, contact)).0
     }
 
     /// Traces the curves in which the two surfaces intersect and writes them to `found`, as far as

@@ -26,4 +26,5 @@ mod routing;
 mod running;
 mod sampling;
 mod slicing;
+mod sweeping;
 mod touching;

@@ -4,6 +4,7 @@ use nearmiss_hierarchy::PointHierarchy;
 
 use crate::ask::options::{CollideOptions, CollidePlan, Method, Order, PlanError, Semantics};
 use crate::distance::DistancePlan;
+use crate::motion::plan::SweepPlan;
 
 /// A validated question about a mesh and a scan. It serves every mesh, and every scan of the same
 /// [metric](PointHierarchy::metric), in any poses.
@@ -39,6 +40,11 @@ impl MeshScanPlan {
 
     /// The contact test of a distance query.
     pub(crate) fn touching(plan: &DistancePlan) -> Self {
+        Self { options: *plan.touching().options() }
+    }
+
+    /// The contact test of a sweep.
+    pub(crate) fn sweeping(plan: &SweepPlan) -> Self {
         Self { options: *plan.touching().options() }
     }
 

@@ -41,6 +41,11 @@ impl<'a> Placed<'a> {
         Self { scan, graph: None, shapes: None, stored_to_world }
     }
 
+    /// The same scan with its graph and its shape index at another pose.
+    pub(crate) fn moved_to(&self, pose: &Pose) -> Self {
+        Self { stored_to_world: Self::new(self.scan, pose).stored_to_world, ..*self }
+    }
+
     /// The same placed scan with its graph, for the geodesic kernel and for searches along the graph.
     #[inline]
     #[must_use]

@@ -21,5 +21,6 @@ mod orders;
 mod outputs;
 mod shapes;
 mod sparse;
+mod sweeps;
 mod twin;
 mod world;

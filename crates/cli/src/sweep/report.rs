@@ -1,0 +1,204 @@
+//! The answer of `sweep` as JSON and as a sentence.
+
+use nearmiss::{Contact, Evidence, SweepAnswer, SweepReason, SweepVerdict};
+use serde::Serialize;
+
+use crate::answer_report::word;
+use crate::digits::{count, place, rough, rounded_down, short, work};
+
+/// The JSON output of `sweep`. Times count lines from the first one, which is at 0.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    verdict: &'static str,
+    evidence: Option<&'static str>,
+    /// The motion is proven free up to this time.
+    t_free: f64,
+    t_hit: Option<f64>,
+    contact: Option<ContactReport>,
+    /// The distance that is proven for the whole motion.
+    clearance: Option<f64>,
+    /// The time of the least distance that was measured.
+    clearance_at: Option<f64>,
+    /// That distance.
+    clearance_upper: Option<f64>,
+    reason: Option<&'static str>,
+    /// The local spacing of the scans where they were nearest, in world units.
+    band: f64,
+    distances: u32,
+    contacts: u32,
+    intervals: u32,
+    evaluations: u64,
+    node_pairs: u64,
+    leaf_pairs: u64,
+    micros: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct ContactReport {
+    point: [f64; 3],
+    normal_a: Option<[f64; 3]>,
+    normal_b: Option<[f64; 3]>,
+    residual: f64,
+    source_a: u32,
+    source_b: u32,
+}
+
+impl ContactReport {
+    fn new(contact: &Contact) -> Self {
+        Self {
+            point: contact.point,
+            normal_a: contact.normals.map(|normals| normals[0]),
+            normal_b: contact.normals.map(|normals| normals[1]),
+            residual: contact.residual,
+            source_a: contact.sources[0].0,
+            source_b: contact.sources[1].0,
+        }
+    }
+}
+
+impl Report {
+    /// The report of an answer about a motion of this duration.
+    pub(super) fn new(answer: &SweepAnswer, duration: f64, micros: f64) -> Self {
+        let report = Self {
+            verdict: "undecided",
+            evidence: None,
+            t_free: 0.0,
+            t_hit: None,
+            contact: None,
+            clearance: None,
+            clearance_at: None,
+            clearance_upper: None,
+            reason: None,
+            band: answer.band,
+            distances: answer.distances,
+            contacts: answer.contacts,
+            intervals: answer.intervals,
+            evaluations: answer.statistics.evaluations,
+            node_pairs: answer.statistics.node_pairs,
+            leaf_pairs: answer.statistics.leaf_pairs,
+            micros,
+        };
+        match answer.verdict {
+            SweepVerdict::Free { clearance, upper, at } => Self {
+                verdict: "free",
+                evidence: Some(word(Evidence::Certified)),
+                t_free: duration,
+                clearance: Some(clearance),
+                clearance_at: Some(at),
+                clearance_upper: Some(upper),
+                ..report
+            },
+            SweepVerdict::Impact { t_free, t_hit, contact, evidence } => Self {
+                verdict: "impact",
+                evidence: Some(word(evidence)),
+                t_free,
+                t_hit: Some(t_hit),
+                contact: Some(ContactReport::new(&contact)),
+                ..report
+            },
+            SweepVerdict::Undecided { t_free, reason } => {
+                Self { t_free, reason: Some(reason_word(reason)), ..report }
+            }
+        }
+    }
+
+    /// The answer as a sentence. `unit` is the length to which places are rounded.
+    pub(super) fn sentence(&self, answer: &SweepAnswer, wanted: f64, unit: f64) -> String {
+        let within =
+            if wanted > 0.0 { format!(" within {} of each other", short(wanted)) } else { String::new() };
+        let free_to = |t: f64| match t > 0.0 {
+            true => format!("The motion is proven free up to t = {}.", time_down(t)),
+            false => "Nothing before that is proven free.".to_owned(),
+        };
+        match answer.verdict {
+            SweepVerdict::Free { clearance, upper, at } => {
+                let kept = match clearance > 0.0 {
+                    true => format!("at least {}", rounded_down(clearance, unit)),
+                    false => "more than 0".to_owned(),
+                };
+                format!(
+                    "The whole motion is free (certified): the distance is always {kept}. The least measured is at \
+                     most {}, at t = {}.",
+                    short(upper),
+                    short(at)
+                )
+            }
+            SweepVerdict::Impact { t_hit: 0.0, contact, evidence, .. } => {
+                let verb = if wanted > 0.0 { "come" } else { "touch" };
+                format!(
+                    "They {verb}{within} at the start, at {} ({}).",
+                    place(contact.point, unit),
+                    word(evidence)
+                )
+            }
+            SweepVerdict::Impact { t_free, t_hit, contact, evidence } => {
+                let verb = if wanted > 0.0 { "come" } else { "touch" };
+                let at = place(contact.point, unit);
+                format!(
+                    "They {verb}{within} at t = {}, at {at} ({}). {}",
+                    time(t_hit),
+                    word(evidence),
+                    free_to(t_free)
+                )
+            }
+            SweepVerdict::Undecided { t_free, reason } => {
+                let why = match reason {
+                    SweepReason::Near => format!(
+                        "from t = {} on they come nearer than can be proven apart (about two local spacings of {}), but \
+                         no contact was found",
+                        time_down(t_free),
+                        rough(answer.band)
+                    ),
+                    SweepReason::Budget => "the budget ran out; raise --budget or --work".to_owned(),
+                    SweepReason::Pose => "a pose is invalid".to_owned(),
+                    SweepReason::Geodesic => {
+                        "the geodesic kernel proves no separation; prepare the scans with --kernel euclidean"
+                            .to_owned()
+                    }
+                    _ => "for an unknown reason".to_owned(),
+                };
+                let proven = if t_free > 0.0 { format!(" {}", free_to(t_free)) } else { String::new() };
+                format!("Cannot tell: {why}.{proven}")
+            }
+        }
+    }
+
+    /// The cost as a line.
+    pub(super) fn details(&self) -> String {
+        let queries = [
+            count(u64::from(self.distances), "distance query").replace("querys", "queries"),
+            count(u64::from(self.contacts), "contact test"),
+            count(u64::from(self.intervals), "interval"),
+        ];
+        let cost = work(
+            [
+                (self.node_pairs, "node pair"),
+                (self.leaf_pairs, "leaf pair"),
+                (self.evaluations, "evaluation"),
+            ],
+            self.micros,
+        );
+        format!("t counts lines, the first is 0; {}; {cost}", queries.join(", "))
+    }
+}
+
+fn reason_word(reason: SweepReason) -> &'static str {
+    match reason {
+        SweepReason::Near => "near",
+        SweepReason::Budget => "budget",
+        SweepReason::Pose => "pose",
+        SweepReason::Geodesic => "geodesic",
+        _ => "unknown",
+    }
+}
+
+/// Formats a time.
+pub(super) fn time(t: f64) -> String {
+    let text = format!("{t:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// Formats a time up to which something is proven: never later.
+fn time_down(t: f64) -> String {
+    time((t * 1e4).floor() / 1e4)
+}

@@ -1,0 +1,101 @@
+//! `sweep`.
+
+use nearmiss_testdata::shapes::sphere;
+
+use crate::running::{Place, keys, numbers, sorted};
+
+/// Returns a folder with a ball of radius 1, and three paths: into another one, past it, and of one
+/// pose.
+fn place() -> Place {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.08);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm"]);
+    place.write("into.txt", "6 0 0 0 0 0 1\n-6 0 0 0 0 0 1\n");
+    place.write("past.txt", "# past it\n6 0 0 0 0 0 1\n0 4 0 0 0 0 1\n");
+    place.write("one.txt", "3 0 0 0 0 0 1\n");
+    place
+}
+
+#[test]
+fn impacts_and_free_motions_are_told_in_json_and_in_words() {
+    let place = place();
+    let ask = |path: &str, more: &[&str]| {
+        let args = [&["sweep", "ball.nm", "ball.nm", "--path", path][..], more].concat();
+        place.ok(&args)
+    };
+    let told = ask("into.txt", &["--json"]).json().remove(0);
+    let expected = "verdict evidence t_free t_hit contact clearance clearance_at clearance_upper reason band \
+                    distances contacts intervals evaluations node_pairs leaf_pairs micros";
+    assert_eq!(keys(&told), sorted(expected));
+    assert_eq!(told["verdict"], "impact", "{told}");
+    let [free, hit] = ["t_free", "t_hit"].map(|key| told[key].as_f64().unwrap());
+    // The balls touch when their centres are 2 apart.
+    assert!(free < hit && free > 0.31 && (hit - 1.0 / 3.0).abs() < 0.01, "{told}");
+    let point = numbers(&told["contact"]["point"]);
+    assert!((point[0] - 1.0).abs() < 0.2 && point[1].abs() < 0.3, "{told}");
+    assert_eq!(told["clearance"], serde_json::Value::Null, "{told}");
+    let people = ask("into.txt", &[]).results;
+    assert!(
+        people.starts_with("They touch at t = 0.33") && people.contains("proven free up to t = 0.3"),
+        "{people}"
+    );
+    assert!(people.contains("distance quer") && people.contains("node pair"), "{people}");
+
+    let told = ask("past.txt", &["--json"]).json().remove(0);
+    assert_eq!((&told["verdict"], &told["evidence"]), (&"free".into(), &"certified".into()), "{told}");
+    assert_eq!(told["t_free"], 1.0, "{told}");
+    let [kept, upper] = ["clearance", "clearance_upper"].map(|key| told[key].as_f64().unwrap());
+    // The line from (6, 0, 0) to (0, 4, 0) is 3.33 from the origin.
+    assert!(kept > 0.4 && kept <= upper && upper < 2.1, "{told}");
+    let people = ask("past.txt", &[]).results;
+    assert!(
+        people.starts_with("The whole motion is free (certified): the distance is always at least "),
+        "{people}"
+    );
+    let near = ask("past.txt", &["--clearance", "1.5", "--json"]).json().remove(0);
+    assert_eq!(near["verdict"], "impact", "{near}");
+    assert!(
+        ask("past.txt", &["--clearance", "1.5"]).results.contains("come within 1.5 of each other at t = "),
+        "told"
+    );
+    let still = ask("one.txt", &["--json"]).json().remove(0);
+    assert_eq!((&still["verdict"], &still["t_free"]), (&"free".into(), &0.0.into()), "{still}");
+    let short = ask("into.txt", &["--work", "20", "--json"]).json().remove(0);
+    assert_eq!((&short["verdict"], &short["reason"]), (&"undecided".into(), &"budget".into()), "{short}");
+    assert!(
+        ask("into.txt", &["--work", "20"]).results.starts_with("Cannot tell: the budget ran out"),
+        "told"
+    );
+    let balls = ask("into.txt", &["--thickened", "0.1", "--json"]).json().remove(0);
+    assert!((balls["t_hit"].as_f64().unwrap() - 3.8 / 12.0).abs() < 0.01, "{balls}");
+}
+
+#[test]
+fn a_picture_shows_the_motion_and_the_distance() {
+    let place = place();
+    for path in ["into.txt", "past.txt", "one.txt"] {
+        place.ok(&["sweep", "ball.nm", "ball.nm", "--path", path, "--image", "sweep.png"]);
+        let (width, pixels) = place.picture("sweep.png");
+        let painted = pixels.chunks(3).filter(|p| p.iter().any(|&c| c < 200)).count();
+        assert!(width > 1000 && painted > 5000, "{path}: {painted} pixels");
+    }
+}
+
+#[test]
+fn paths_that_are_no_motion_are_refused_with_their_line() {
+    let place = place();
+    place.write("grows.txt", "1 0 0 3 0 1 0 0 0 0 1 0 0 0 0 1\n2 0 0 3 0 2 0 0 0 0 2 0 0 0 0 1\n");
+    place.write("empty.txt", "# nothing\n");
+    place.write("nan.txt", "3 0 0 0 0 0 1\nnan 0 0 0 0 0 1\n");
+    let refused = |path: &str, words: &[&str]| {
+        place.refused(1, &["sweep", "ball.nm", "ball.nm", "--path", path], words);
+    };
+    refused("grows.txt", &["line 2", "expected one scale along a path, got 1 and then 2"]);
+    refused("empty.txt", &["expected poses, got none"]);
+    refused("nan.txt", &["line 2"]);
+    refused("missing.txt", &["missing.txt"]);
+    let args = ["sweep", "ball.nm", "ball.nm", "--path", "into.txt"];
+    place.refused(2, &args[..3], &["--path"]);
+    place.refused(2, &[&args[..], &["--clearance", "-1"]].concat(), &["--clearance"]);
+    place.refused(2, &[&args[..], &["--image", "sweep.jpg"]].concat(), &[".png"]);
+}
