@@ -13,8 +13,8 @@ use crate::ask::options::Order;
 use crate::papers::Papers;
 
 impl Papers<'_, '_> {
-    /// Returns the priority of a pair, lowest first: `share` minus the count of sample points on
-    /// the sides. As `share` is about one at most, it decides between pairs with equal counts.
+    /// Returns the priority of a pair, lowest first: by cells, their negated number; otherwise
+    /// `share` minus the count of sample points on the sides. As `share` is about one at most, it decides between pairs with equal counts.
     /// `None` if the coverings are disjoint.
     pub(crate) fn look_closer(&mut self, pair: NodePair, share: f32) -> Option<f32> {
         let (slices_a, slices_b) = (self.search.pair.a, self.search.pair.b);
@@ -33,7 +33,8 @@ impl Papers<'_, '_> {
         let sides = match self.order {
             Order::Sides => self.sides(pair, |_| 1.0),
             Order::SidesByGap => self.sides(pair, eigenvalue_gap),
-            _ => 0.0,
+            Order::Cells => return Some(-self.common_cells(pair)),
+            Order::DepthFirst | Order::Overlap => 0.0,
         };
         Some(share - sides)
     }
