@@ -10,11 +10,12 @@ use nearmiss::{
 };
 
 /// Traversal orders by name.
-pub const ORDERS: [(&str, Order); 4] = [
+pub const ORDERS: [(&str, Order); 5] = [
     ("depth", Order::DepthFirst),
     ("overlap", Order::Overlap),
     ("sides", Order::Sides),
     ("sides-by-gap", Order::SidesByGap),
+    ("cells", Order::Cells),
 ];
 
 /// Leaf tests by name.

@@ -7,8 +7,8 @@ use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
     Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves,
     Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interpolation, ManifoldPoint,
-    Mesh, MeshBuildOptions, MeshScanPair, MeshScanPlan, Method, Motion, Pair, Paths, Pose, Prepared, Scan,
-    Scratch, Semantics, Sweep, SweepOptions, SweepPlan, SweepVerdict, Verdict,
+    Mesh, MeshBuildOptions, MeshPair, MeshScanPair, MeshScanPlan, MeshSolid, Method, Motion, Pair, Paths,
+    Pose, Prepared, Scan, Scratch, Semantics, Sweep, SweepOptions, SweepPlan, SweepVerdict, Verdict,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -186,6 +186,22 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     assert_eq!(compare_all(), first, "answers about a mesh depend on the scratch");
     assert_eq!(ALLOCATOR.calls() - before, 0, "queries of a mesh and a scan allocated");
     assert!(first.0 > 100, "{} contacts", first.0);
+
+    let solid = MeshSolid::new(&mesh);
+    let mut separate_all = || {
+        let mut sum = 0.0;
+        for (pose, work) in poses.iter().step_by(20).zip([u64::MAX, 400].into_iter().cycle()) {
+            let budget = Budget::UNLIMITED.with_work(work);
+            let pair = MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(pose)).within(&budget);
+            sum += pair.penetration([&solid; 2], scratch.meshes()).upper;
+        }
+        sum
+    };
+    let first = separate_all();
+    let before = ALLOCATOR.calls();
+    assert_eq!(separate_all().to_bits(), first.to_bits(), "penetrations depend on the scratch");
+    assert_eq!(ALLOCATOR.calls() - before, 0, "penetrations allocated");
+    assert!(first > object.r, "some overlap: {first}");
 
     let rng = &mut rng(5);
     let places: Vec<[f64; 3]> = (0..POSES)

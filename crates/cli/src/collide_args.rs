@@ -126,7 +126,7 @@ impl CollideArgs {
     pub(crate) fn check_as_mesh(&self, which: AsMeshName) -> Result<(), CliError> {
         let of_meshes = which == AsMeshName::Both;
         let SearchArgs { order, resolution, .. } = self.search;
-        let of_papers = matches!(order, Some(OrderName::Sides | OrderName::SidesByGap));
+        let of_papers = matches!(order, Some(OrderName::Sides | OrderName::SidesByGap | OrderName::Cells));
         which.refuse(&[
             ("--kernel", of_meshes && self.kernel.is_some()),
             ("--surface-only", of_meshes && self.meaning.surface_only),
@@ -144,7 +144,7 @@ impl CollideArgs {
             ("--coverings", self.search.coverings),
             ("--resolution", resolution.is_some()),
             ("--surfels", self.search.surfels.is_some()),
-            ("--image", self.image.is_some()),
+            ("--image", !of_meshes && self.image.is_some()),
         ])
     }
 }

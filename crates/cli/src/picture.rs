@@ -144,7 +144,7 @@ pub(crate) fn paint(views: [&Placed<'_>; 2], answer: &Answer, style: &Style) -> 
 }
 
 /// Describes the close view of a contact.
-fn close_told(points: bool) -> &'static str {
+pub(crate) fn close_told(points: bool) -> &'static str {
     if points {
         "The close view shows the two points whose balls meet, and the line between them."
     } else {
@@ -158,10 +158,19 @@ pub(crate) fn paint_both(
     canvas: &mut Canvas,
     area: Area,
     views: [&Placed<'_>; 2],
+    paint: impl FnMut(&mut Canvas, usize),
+) {
+    paint_sized(canvas, area, views.map(half_diagonal), paint);
+}
+
+/// Does the same for two things with these half diagonals.
+pub(crate) fn paint_sized(
+    canvas: &mut Canvas,
+    area: Area,
+    [a, b]: [f64; 2],
     mut paint: impl FnMut(&mut Canvas, usize),
 ) {
     (0..2).for_each(|side| paint(canvas, side));
-    let [a, b] = views.map(half_diagonal);
     let small = if a < SMALL * b { 0 } else { 1 };
     if a.min(b) < SMALL * a.max(b) {
         let (width, height) = canvas.size();
@@ -220,14 +229,14 @@ pub(crate) fn dot(splat: &Splat, camera: &Camera, pixels: f64) -> Splat {
 }
 
 /// The close view of a contact.
-struct Close {
-    point: Vector3<f64>,
-    normals: [Vector3<f64>; 2],
+pub(crate) struct Close {
+    pub(crate) point: Vector3<f64>,
+    pub(crate) normals: [Vector3<f64>; 2],
     /// Half the width of the view.
-    reach: f64,
+    pub(crate) reach: f64,
     /// The two points of the contact, if points are shown.
-    pair: Option<[Vector3<f64>; 2]>,
-    upright: Option<Upright>,
+    pub(crate) pair: Option<[Vector3<f64>; 2]>,
+    pub(crate) upright: Option<Upright>,
 }
 
 impl Close {
@@ -251,7 +260,7 @@ impl Close {
 
     /// Returns the direction of the line of intersection. If the surfaces are nearly parallel,
     /// returns a direction along both.
-    fn chord(&self) -> Vector3<f64> {
+    pub(crate) fn chord(&self) -> Vector3<f64> {
         let [na, nb] = self.normals;
         let chord = na.cross(&nb);
         let chord = if chord.norm() > 0.1 { chord.normalize() } else { across(na) };
@@ -261,7 +270,7 @@ impl Close {
 
     /// Returns a camera that looks obliquely along the chord. The cut is seen as a line, and the
     /// surfaces behind it as surfaces. The normals point up unless the picture is upright.
-    fn camera(&self, area: Area) -> Camera {
+    pub(crate) fn camera(&self, area: Area) -> Camera {
         let chord = self.chord();
         let scale = scale_of(area, self.reach);
         if let Some(upright) = self.upright {
@@ -305,16 +314,26 @@ impl Close {
                 canvas.line(area, [[x, y]; 2], 2.0 * CLOSE_DOT, colour);
             }
         } else {
-            let colours = [shade(OF_A, 0.7), shade(OF_B, 0.75)];
-            for (normal, colour) in self.normals.into_iter().zip(colours) {
-                let n = camera.turn(normal);
-                let side = if n[1] < 0.0 { -1.0 } else { 1.0 };
-                arrow(canvas, &camera, self.point, normal * (side * 0.4 * self.reach), colour);
-            }
+            self.paint_normals(canvas, &camera);
         }
-        mark(canvas, &camera, self.point, 1.3);
-        title(canvas, area, "Close view");
-        scale_bar_in(canvas, &camera, unit);
+        self.finish(canvas, &camera, unit);
+    }
+
+    /// Draws arrows along the normals, upwards in the picture.
+    pub(crate) fn paint_normals(&self, canvas: &mut Canvas, camera: &Camera) {
+        let colours = [shade(OF_A, 0.7), shade(OF_B, 0.75)];
+        for (normal, colour) in self.normals.into_iter().zip(colours) {
+            let n = camera.turn(normal);
+            let side = if n[1] < 0.0 { -1.0 } else { 1.0 };
+            arrow(canvas, camera, self.point, normal * (side * 0.4 * self.reach), colour);
+        }
+    }
+
+    /// Marks the point, and adds the title and the scale.
+    pub(crate) fn finish(&self, canvas: &mut Canvas, camera: &Camera, unit: WorldUnit) {
+        mark(canvas, camera, self.point, 1.3);
+        title(canvas, camera.area, "Close view");
+        scale_bar_in(canvas, camera, unit);
     }
 }
 

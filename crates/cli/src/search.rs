@@ -122,6 +122,8 @@ pub enum OrderName {
     Sides,
     /// The same, weighted by the eigenvalue gap
     SidesByGap,
+    /// Pairs whose surfaces are expected to fill most common cells come first (slides, 2003)
+    Cells,
 }
 
 impl SearchArgs {
@@ -203,6 +205,7 @@ impl SearchArgs {
             OrderName::Overlap => Order::Overlap,
             OrderName::Sides => Order::Sides,
             OrderName::SidesByGap => Order::SidesByGap,
+            OrderName::Cells => Order::Cells,
         });
         let options = options.with_method(method).with_coverings(self.coverings);
         Ok(order.map_or(options, |order| options.with_order(order)))

@@ -123,7 +123,7 @@ pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
             unit: args.pair.world_unit(),
         };
         let moving = [a.along(&motions[0]), b.along(&motions[1])];
-        picture::paint(moving, &plan, &answer, &style).save(path)?;
+        output::save_picture(&picture::paint(moving, &plan, &answer, &style), path)?;
         drop(bar);
     }
     let mut results = Results::new();

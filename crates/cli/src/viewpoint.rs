@@ -100,9 +100,40 @@ const LIKED: f64 = 0.5;
 /// The direction taken as up if no axis is known to point up.
 const ABOUT_UP: [f64; 3] = [0.0, 0.7, 0.7];
 
+/// A placed thing in a picture, as the choice of a viewpoint sees it.
+pub(crate) trait Shown {
+    /// Returns a sample of at most [`SAMPLE`] of its points in the world.
+    fn points(&self) -> Vec<Vector3<f64>>;
+
+    /// Returns the share of its surface with a normal along z.
+    fn level_share(&self) -> f64;
+
+    /// Returns its centre in the world.
+    fn centre(&self) -> Vector3<f64>;
+}
+
+impl Shown for Placed<'_> {
+    fn points(&self) -> Vec<Vector3<f64>> {
+        (0..self.scan().len()).step_by(stride(self.scan().len())).map(|i| self.point(i).into()).collect()
+    }
+
+    fn level_share(&self) -> f64 {
+        let normals = || self.scan().normals().iter().step_by(stride(self.scan().len()));
+        let is_level =
+            |normal: &&[f32; 3]| self.stored_to_world().rotate(normal.map(f64::from))[2].abs() > LEVEL;
+        #[expect(clippy::cast_precision_loss, reason = "counts")]
+        let share = normals().filter(is_level).count() as f64 / normals().count() as f64;
+        share
+    }
+
+    fn centre(&self) -> Vector3<f64> {
+        self.stored_to_world().apply(self.scan().outline().discs.centre).into()
+    }
+}
+
 impl ViewArgs {
     /// Returns the frame of an upright picture, or `None` if any orientation will do.
-    pub(crate) fn upright(&self, views: [&Placed<'_>; 2]) -> Option<Upright> {
+    pub(crate) fn upright<T: Shown>(&self, views: [&T; 2]) -> Option<Upright> {
         let by_default = || (self.view.is_some() || has_level_floors(views)).then_some(Up::Z);
         self.up.or_else(by_default).map(Upright::new)
     }
@@ -111,9 +142,9 @@ impl ViewArgs {
     /// direction is given, the camera chooses one with little hidden and the scans beside each
     /// other. `hides` estimates how much is hidden by the given points in a direction towards the
     /// viewer.
-    pub(crate) fn camera(
+    pub(crate) fn camera<T: Shown>(
         &self,
-        views: [&Placed<'_>; 2],
+        views: [&T; 2],
         area: Area,
         shown: &[Vector3<f64>],
         hides: impl Fn(&[Vector3<f64>], &Vector3<f64>) -> f64,
@@ -137,9 +168,9 @@ impl ViewArgs {
 
     /// Returns a camera that shows `reach` to every side of `centre`. If no direction is given,
     /// `cost` is minimised.
-    pub(crate) fn close_camera(
+    pub(crate) fn close_camera<T: Shown>(
         &self,
-        views: [&Placed<'_>; 2],
+        views: [&T; 2],
         area: Area,
         (centre, reach): (Vector3<f64>, f64),
         cost: impl Fn(&Vector3<f64>) -> f64,
@@ -155,9 +186,9 @@ impl ViewArgs {
     }
 
     /// Returns the axes of an upright camera, or `None` if any orientation will do.
-    fn axes(
+    fn axes<T: Shown>(
         &self,
-        views: [&Placed<'_>; 2],
+        views: [&T; 2],
         cost: impl Fn(&Vector3<f64>) -> f64,
     ) -> Option<[Vector3<f64>; 3]> {
         let upright = self.upright(views)?;
@@ -191,11 +222,11 @@ const OUTLYING: f64 = 0.003;
 const SPENT: f64 = 0.25;
 
 /// Returns a camera with these axes that shows both scans without outliers, and all places `shown`.
-fn fitted(axes: [Vector3<f64>; 3], views: [&Placed<'_>; 2], shown: &[Vector3<f64>], area: Area) -> Camera {
+fn fitted<T: Shown>(axes: [Vector3<f64>; 3], views: [&T; 2], shown: &[Vector3<f64>], area: Area) -> Camera {
     let mut camera = Camera { axes, centre: Vector3::zeros(), scale: 1.0, area };
     let across = |p: &Vector3<f64>, k: usize| axes[k].dot(p);
     let ranges = [0, 1].map(|k| {
-        let of_view = |view| usual(points_of(view).map(|p| across(&p, k)).collect());
+        let of_view = |view: &T| usual(view.points().iter().map(|p| across(p, k)).collect());
         let places = shown.iter().map(|p| [across(p, k); 2]);
         let all = views.into_iter().map(of_view).chain(places);
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [l, h]| [low.min(l), high.max(h)])
@@ -230,22 +261,17 @@ fn usual(mut values: Vec<f64>) -> [f64; 2] {
 /// Floors and ceilings: normals count as theirs if the component along z is at least `LEVEL`. The
 /// share is 3 % for evenly spread normals, 12 to 50 % in rooms, buildings and streets, and 2 to 8 %
 /// for single objects.
-const LEVEL: f64 = 0.97;
+pub(crate) const LEVEL: f64 = 0.97;
 const LEVEL_SHARE: f64 = 0.1;
 
-/// Returns `true` if the normals of the larger scan show level floors and its height is not its
+/// Returns `true` if the normals of the larger thing show level floors and its height is not its
 /// greatest extent.
-fn has_level_floors(views: [&Placed<'_>; 2]) -> bool {
-    let sides = views.map(|view| extents(&points_of(view).collect::<Vec<_>>()));
+fn has_level_floors<T: Shown>(views: [&T; 2]) -> bool {
+    let sides = views.map(|view| extents(&view.points()));
     let size = |sides: [f64; 3]| sides.iter().map(|side| side * side).sum::<f64>();
     let (view, [x, y, z]) =
         if size(sides[1]) > size(sides[0]) { (views[1], sides[1]) } else { (views[0], sides[0]) };
-    let normals = || view.scan().normals().iter().step_by(stride(view));
-    let is_level = |normal: &&[f32; 3]| view.stored_to_world().rotate(normal.map(f64::from))[2].abs() > LEVEL;
-    let (level, all) = (normals().filter(is_level).count(), normals().count());
-    #[expect(clippy::cast_precision_loss, reason = "counts")]
-    let has_floors = level as f64 > LEVEL_SHARE * all as f64;
-    has_floors && z < x.max(y)
+    view.level_share() > LEVEL_SHARE && z < x.max(y)
 }
 
 /// Returns the sides of the bounding box of some points.
@@ -258,20 +284,17 @@ fn extents(points: &[Vector3<f64>]) -> [f64; 3] {
     })
 }
 
-/// The greatest number of points of a scan that are sampled to choose a view.
+/// The greatest number of points of a thing that are sampled to choose a view.
 const SAMPLE: usize = 20_000;
 
-fn stride(view: &Placed<'_>) -> usize {
-    view.scan().len().div_ceil(SAMPLE).max(1)
+/// Returns the step at which at most [`SAMPLE`] of `count` things are taken.
+pub(crate) fn stride(count: usize) -> usize {
+    count.div_ceil(SAMPLE).max(1)
 }
 
-fn points_of<'a>(view: &'a Placed<'_>) -> impl Iterator<Item = Vector3<f64>> + 'a {
-    (0..view.scan().len()).step_by(stride(view)).map(|i| Vector3::from(view.point(i)))
-}
-
-/// Returns a sample of the points of both scans.
-pub(crate) fn sample(views: [&Placed<'_>; 2]) -> Vec<Vector3<f64>> {
-    views.into_iter().flat_map(points_of).collect()
+/// Returns a sample of the points of both things.
+pub(crate) fn sample<T: Shown>(views: [&T; 2]) -> Vec<Vector3<f64>> {
+    views.into_iter().flat_map(T::points).collect()
 }
 
 /// Returns a camera for both scans, with a direction in which little is hidden by the estimate
@@ -291,7 +314,7 @@ pub(crate) fn scan_camera(view: &Placed<'_>, area: Area) -> Camera {
 
 /// Returns the directions of the greatest and the second extent, and the unit vector from the
 /// centre of the first scan to that of the second, or zero if they coincide.
-fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> ([Vector3<f64>; 2], Vector3<f64>) {
+fn extent<T: Shown>(points: &[Vector3<f64>], views: [&T; 2]) -> ([Vector3<f64>; 2], Vector3<f64>) {
     #[expect(clippy::cast_precision_loss, reason = "a count")]
     let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let mut s = [0.0; 6];
@@ -301,7 +324,7 @@ fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> ([Vector3<f64>; 2
             *sum += v;
         }
     }
-    let [ca, cb] = views.map(|v| Vector3::from(v.stored_to_world().apply(v.scan().outline().discs.centre)));
+    let [ca, cb] = views.map(T::centre);
     let apart = (cb - ca).try_normalize(0.0).unwrap_or_default();
     let [_, wide, long] = symmetric_eigen(s).vectors;
     ([long, wide].map(Vector3::from), apart)

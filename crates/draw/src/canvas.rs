@@ -138,6 +138,38 @@ impl Canvas {
         }
     }
 
+    /// Paints a lit triangle, hidden by anything nearer to the viewer.
+    pub fn triangle(&mut self, camera: &Camera, corners: &[Vector3<f64>; 3], colour: Colour) {
+        let [p, q, r] = corners.map(|corner| camera.project(corner));
+        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let Some(normal) = normal.try_normalize(0.0) else { return };
+        let n = camera.turn(normal);
+        let lambert = (0..3).map(|k| n[k] * LIGHT[k]).sum::<f64>().abs();
+        let lit = shade(colour, AMBIENT + (1.0 - AMBIENT) * lambert);
+        let area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        if area == 0.0 {
+            return;
+        }
+        let middle = [0, 1].map(|k| 0.5 * (p[k].min(q[k]).min(r[k]) + p[k].max(q[k]).max(r[k])));
+        let half = [0, 1].map(|k| p[k].max(q[k]).max(r[k]) - middle[k]);
+        let columns = pixels_about(camera.area, middle, half[0]).0;
+        let rows = pixels_about(camera.area, middle, half[1]).1;
+        for row in rows {
+            for column in columns.clone() {
+                let [x, y] = centre_of(column, row);
+                let u = ((x - p[0]) * (r[1] - p[1]) - (y - p[1]) * (r[0] - p[0])) / area;
+                let v = ((q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])) / area;
+                let near = p[2] + u * (q[2] - p[2]) + v * (r[2] - p[2]);
+                let i = row * self.width + column;
+                let is_inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+                if is_inside && near > self.depth[i] {
+                    self.depth[i] = near;
+                    self.pixels[i] = lit;
+                }
+            }
+        }
+    }
+
     /// Paints a lit ball, hidden by anything nearer to the viewer.
     pub fn ball(&mut self, camera: &Camera, centre: Vector3<f64>, radius: f64, colour: Colour) {
         let [x, y, z] = camera.project(centre);
@@ -317,7 +349,9 @@ pub fn shade(colour: Colour, light: f64) -> Colour {
     blend([0; 3], colour, light.clamp(0.0, 1.0))
 }
 
-pub(crate) fn blend(below: Colour, above: Colour, share: f64) -> Colour {
+/// Returns the mixture of two colours with this share of `above`, from 0 to 1.
+#[must_use]
+pub fn blend(below: Colour, above: Colour, share: f64) -> Colour {
     std::array::from_fn(|k| {
         let mixed = f64::from(below[k]) * (1.0 - share) + f64::from(above[k]) * share;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]

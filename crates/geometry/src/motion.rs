@@ -128,7 +128,8 @@ impl Screw {
 /// use nearmiss_geometry::{Motion, Pose};
 ///
 /// // A quarter turn about the axis x = 1, parallel to z.
-/// let end = Pose::from_axis_angle([0.0, 0.0, 1.0], std::f64::consts::FRAC_PI_2).with_translation([1.0, -1.0, 0.0]);
+/// let quarter = Pose::from_axis_angle([0.0, 0.0, 1.0], std::f64::consts::FRAC_PI_2);
+/// let end = quarter.with_translation([1.0, -1.0, 0.0]);
 /// let motion = Motion::through(&[Pose::IDENTITY, end])?;
 /// assert_eq!(motion.duration(), 1.0);
 /// let halfway = motion.at(0.5).apply([0.0; 3]);

@@ -11,6 +11,7 @@ mod scan;
 mod tree;
 
 pub use bounds::boxes::{OrientedBox, Relative, SLACK};
+pub use bounds::cells::CELLS;
 pub use bounds::growth::Growth;
 pub use bounds::part::Part;
 pub use descent::{
@@ -19,7 +20,6 @@ pub use descent::{
 };
 pub use mesh::block::{LEAF_TRIANGLES, TriangleBlock};
 pub use mesh::build::{MeshHierarchy, MeshView};
-pub use mesh::cells::CELLS;
 pub use mesh::data::{DroppedTriangles, MeshMeta};
 pub use mesh::deforming::DeformingMesh;
 pub use mesh::options::{MeshBuildError, MeshBuildOptions};

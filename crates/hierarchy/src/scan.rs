@@ -3,6 +3,7 @@
 pub(crate) mod apart;
 pub(crate) mod arrays;
 pub(crate) mod build;
+pub(crate) mod cells;
 pub(crate) mod data;
 pub(crate) mod deform_error;
 pub(crate) mod deforming;

@@ -60,11 +60,11 @@ pub use nearmiss_query::{
     ClashPlan, Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve,
     CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
     Evidence, Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself,
-    MeshPair, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScanSweep, MeshScratch, MeshVerdict,
-    Method, Moving, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedBody, PlacedMesh, PlanError,
-    Prepared, PreparedMesh, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
-    ShapeIndex, Statistics, SurfelSize, Sweep, SweepAnswer, SweepOptions, SweepPlan, SweepReason,
-    SweepVerdict, Until, Verdict, World, each,
+    MeshPair, MeshPenetration, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScanSweep,
+    MeshScratch, MeshSolid, MeshVerdict, Method, Moving, NearestPoint, Order, Pacer, Pair, PairHint, Placed,
+    PlacedBody, PlacedMesh, PlanError, Prepared, PreparedMesh, Proof, Question, Reason, Refinement, Sampling,
+    Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize, Sweep, SweepAnswer, SweepOptions,
+    SweepPlan, SweepReason, SweepVerdict, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

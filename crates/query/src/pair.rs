@@ -1,6 +1,8 @@
 //! Placed scans, pairs of them under a relative pose, and the cost of a search.
 
 pub(crate) mod bounds;
+pub(crate) mod cell_table;
+pub(crate) mod cell_volume;
 pub(crate) mod clearance;
 pub(crate) mod likelihood;
 pub(crate) mod meter;

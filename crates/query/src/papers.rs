@@ -3,12 +3,14 @@
 //! - test points (2004, §5.3);
 //! - searches along the graph (2005, §4);
 //! - priorities by sample points on either side (2004, §5.2);
+//! - the order by well-filled cells (slides, 2003);
 //! - sphere coverings (2004, §5.1);
 //! - a resolution (2004, §1).
 //!
 //! They are visitors of the same descent as the default search and share its contacts and
 //! certificates. The default search does not depend on them.
 
+mod cells;
 mod interpolation;
 pub(crate) mod pacer;
 mod priority;
@@ -25,6 +27,7 @@ use crate::ask::options::{Method, Order};
 use crate::contact::collide::{Asked, ContactScratch, Frontiers, Outputs, collide_by};
 use crate::contact::search::Surfaces;
 use crate::pair::meter::NODE_PAIRS_A_LEAF_PAIR;
+use cells::CountedCells;
 use interpolation::InterpolationScratch;
 
 /// Memory that is reused between queries.
@@ -33,6 +36,8 @@ pub(crate) struct PapersScratch {
     interpolation: InterpolationScratch,
     /// The points of a in the box of b.
     members: Vec<u32>,
+    /// The well-filled cells of both scans.
+    cells: [CountedCells; 2],
 }
 
 /// A search for a crossing by one of the papers' methods.
@@ -66,7 +71,7 @@ pub(crate) fn collide(
     };
     let looked_at = match order {
         Order::Sides | Order::SidesByGap => a.arrays().samples(0).len() as u64,
-        Order::DepthFirst | Order::Overlap => 0,
+        Order::DepthFirst | Order::Overlap | Order::Cells => 0,
     };
     let evaluations = 2 * test_points + NODE_PAIRS_A_LEAF_PAIR * looked_at;
     let mut estimate = f64::INFINITY;
@@ -98,6 +103,11 @@ impl Papers<'_, '_> {
             }
             Method::Sampling(_) | Method::Traversal => {}
         }
+        if self.order == Order::Cells {
+            let [a, b] = &mut self.scratch.cells;
+            a.start(self.search.pair.a);
+            b.start(self.search.pair.b);
+        }
         let (relative, level) = (self.search.pair.relative, self.search.pair.level);
         let trees = self.search.pair.trees(&relative, self.search.reach);
         match self.order {
@@ -114,7 +124,8 @@ impl BoxVisitor for Papers<'_, '_> {
     const LOOKS_CLOSER: bool = true;
 
     fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
-        let looks_closer = self.coverings || matches!(self.order, Order::Sides | Order::SidesByGap);
+        let is_by_share = matches!(self.order, Order::DepthFirst | Order::Overlap);
+        let looks_closer = self.coverings || !is_by_share;
         if looks_closer { self.look_closer(pair, share) } else { Some(share) }
     }
 }

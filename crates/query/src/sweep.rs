@@ -9,7 +9,8 @@ use crate::motion::scans::MovingScans;
 use crate::pair::moving::Moving;
 use crate::question::Scratch;
 
-/// Two scans that move rigidly, each by a [`Motion`](nearmiss_geometry::Motion) of its own, and the budget of the question.
+/// Two scans that move rigidly, each by a [`Motion`](nearmiss_geometry::Motion) of its own, and the
+/// budget of the question.
 ///
 /// ```
 /// use nearmiss_geometry::{Motion, PointCloud, Pose};

@@ -14,6 +14,7 @@ mod evaluation;
 mod geodesics;
 mod hints;
 mod kinetic;
+mod mesh_answers;
 mod mesh_scans;
 mod meshes;
 mod moving;

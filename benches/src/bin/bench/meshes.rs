@@ -17,6 +17,8 @@ use nearmiss_benches::rivals::{Method, program};
 use nearmiss_benches::sample::{Sample, count};
 use nearmiss_benches::{Failure, machine, poses};
 
+use crate::mesh_answers;
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     /// Objects to measure: mesh files, or `dragon-5k` or `dragon-23k`
@@ -223,6 +225,9 @@ fn measure(source: &str, options: &Options) -> Result<(String, Curves), Failure>
         column.row(&format!("distance by {}", engine.name));
     }
     coherent(&mesh, &object, &apart, &mut scratch);
+    let meeting: Vec<Pose> = all.iter().zip(&truth).filter(|(_, hit)| **hit).map(|(pose, _)| *pose).collect();
+    mesh_answers::regions(&mesh, &meeting, &mut scratch);
+    mesh_answers::penetrations(&mesh, &meeting, &mut scratch);
     Ok((object.name, curves))
 }
 

@@ -1,5 +1,6 @@
 //! The options of `mesh-collide`.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
@@ -8,6 +9,7 @@ use crate::contacts::ContactArgs;
 use crate::parse::{parse_duration, parse_threads};
 use crate::path::PathArgs;
 use crate::posing::PairArgs;
+use crate::viewpoint::ViewArgs;
 
 /// Options of `mesh-collide`.
 #[derive(Debug, Clone, Args)]
@@ -29,6 +31,12 @@ pub struct MeshCollideArgs {
     /// The treatment of the contacts
     #[command(flatten)]
     pub contacts: ContactArgs,
+    /// Also tell how far and in which direction to move b out of a
+    ///
+    /// Closed parts count as solid, other parts as surfaces. The length lies between two bounds,
+    /// which hold whenever --budget or --work ends the search.
+    #[arg(long)]
+    pub penetration: bool,
     /// Time limit for each query, such as 200us
     ///
     /// The unit is ns, us, ms or s. When time runs out, the answer is undecided.
@@ -54,6 +62,12 @@ pub struct MeshCollideArgs {
     /// answers do not depend on it.
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
     pub threads: Option<usize>,
+    /// Draw both meshes and their contacts, as PNG
+    #[arg(long, value_name = "OUT.png", conflicts_with = "poses", help_heading = "Output")]
+    pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Print one JSON object for each query
     #[arg(long, help_heading = "Output")]
     pub json: bool,

@@ -1,11 +1,15 @@
 //! `mesh-collide`: tests whether two meshes meet, and where.
 
 use nearmiss::{
-    MeshAnswer, MeshContact, MeshDistance, MeshPair, MeshQuality, MeshScratch, MeshVerdict, Pose, Scratch,
+    MeshAnswer, MeshContact, MeshDistance, MeshPair, MeshPenetration, MeshQuality, MeshScratch, MeshSolid,
+    MeshVerdict, Pose, Scratch,
 };
+use nearmiss_draw::picture::Picture;
 
 use super::args::MeshCollideArgs;
 use super::contacts::MeshContacts;
+use super::penetration::penetration_sentence;
+use super::picture::{Told, paint};
 use super::report::{MeshAnswerReport, evidence_and_reason, kind};
 use super::two_meshes::{TwoMeshes, micros_since};
 use super::words::{contact_line, sentence};
@@ -14,7 +18,7 @@ use crate::error::CliError;
 use crate::output;
 use crate::path::PathLog;
 use crate::path_entry::PathEntry;
-use crate::picture::names;
+use crate::picture::{Style, check_name, names};
 use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PoseFile, Posed};
 use crate::sentence::far_apart;
@@ -25,6 +29,8 @@ struct Question<'a> {
     args: &'a MeshCollideArgs,
     /// `true` if the clearance of separated poses is needed.
     clearance: bool,
+    /// The solids of both meshes, with `--penetration`.
+    solids: Option<[MeshSolid; 2]>,
 }
 
 /// A query and its answer.
@@ -39,6 +45,8 @@ struct Asked {
     contacts: Option<(Vec<MeshContact>, bool)>,
     /// The distance, if it was computed.
     clearance: Option<MeshDistance>,
+    /// The penetration, with `--penetration`.
+    penetration: Option<MeshPenetration>,
     micros: f64,
 }
 
@@ -66,13 +74,18 @@ impl Asked {
 
 pub(crate) fn run(args: &MeshCollideArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
+    if let Some(path) = &args.image {
+        output::check_apart(path, &args.pair.inputs())?;
+        check_name(path)?;
+    }
     args.path.check(&args.pair.inputs(), Some(args.all))?;
     args.contacts.check(args.path.csv.as_deref(), &args.pair.inputs())?;
     let matrices = args.pair.matrices()?;
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
     let meshes = TwoMeshes::open(&args.pair, args.threads, (args.budget, args.work), console)?;
     let clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
-    let question = Question { meshes, args, clearance };
+    let solids = args.penetration.then(|| meshes.both().map(|mesh| MeshSolid::new(mesh)));
+    let question = Question { meshes, args, clearance, solids };
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
@@ -85,6 +98,10 @@ pub(crate) fn run(args: &MeshCollideArgs) -> Result<(), CliError> {
         None => {
             let poses = posing::of_options(&matrices, question.meshes.both())?;
             let asked = question.ask(None, Posed { poses, time: None }, &mut MeshScratch::default());
+            if let Some(path) = &args.image {
+                let _bar = console.spinner(format_args!("painting {}", path.display()));
+                output::save_picture(&question.paint(&asked), path)?;
+            }
             question.tell(&asked, &mut results)?;
         }
     }
@@ -134,7 +151,9 @@ impl Question<'_> {
         let clearance = wants_clearance.then(|| self.meshes.pair(&poses, now()).distance(scratch));
         // An infinite distance is that of an invalid pose.
         let clearance = clearance.filter(|found| found.upper.is_finite());
-        Asked { line, time, poses, answer, contacts, clearance, micros }
+        let solids = self.solids.as_ref().map(|solids| solids.each_ref());
+        let penetration = solids.map(|solids| self.meshes.pair(&poses, now()).penetration(solids, scratch));
+        Asked { line, time, poses, answer, contacts, clearance, penetration, micros }
     }
 
     /// Tests the meshes as well as --p-min and --k-min ask for.
@@ -143,6 +162,29 @@ impl Question<'_> {
         let quality = MeshQuality::default().with_p_min(p_min);
         let quality = self.args.k_min.map_or(quality, |k_min| quality.with_k_min(k_min));
         pair.collide_likely(&quality, scratch)
+    }
+
+    /// Paints the meshes, and their contacts or nearest points.
+    fn paint(&self, asked: &Asked) -> Picture {
+        let pair = self.meshes.pair(&asked.poses, now());
+        let (mut contacts, scratch) = (Vec::new(), &mut MeshScratch::default());
+        let distance = asked.answer.verdict.is_separated().then(|| pair.distance(scratch));
+        if asked.answer.verdict.is_intersecting() {
+            pair.contacts(&mut contacts, scratch);
+        }
+        let told = Told {
+            answer: &asked.answer,
+            contacts: &contacts,
+            distance: distance.as_ref(),
+            digit: self.meshes.unit(&asked.poses),
+        };
+        let style = Style {
+            names: names(self.args.pair.inputs()),
+            points: false,
+            view: self.args.view,
+            unit: self.args.pair.world_unit(),
+        };
+        paint(self.meshes.placed(&asked.poses).each_ref(), &told, &style)
     }
 
     fn tell(&self, asked: &Asked, results: &mut Results) -> Result<(), CliError> {
@@ -154,7 +196,7 @@ impl Question<'_> {
             all.write(csv, &self.args.contacts)?;
         }
         let all = grouped.as_ref().map(|(all, complete)| (all, *complete));
-        let report = MeshAnswerReport::new(&asked.answer, all, asked.micros);
+        let report = MeshAnswerReport::new(&asked.answer, all, asked.penetration.as_ref(), asked.micros);
         if self.args.json {
             return results.json(&report);
         }
@@ -163,7 +205,12 @@ impl Question<'_> {
         let beside =
             is_apart.then(|| self.meshes.pair(&asked.poses, now()).distance(&mut MeshScratch::default()));
         let distance = beside.as_ref().or(asked.clearance.as_ref());
+        let apart = asked.penetration.as_ref().and_then(|found| penetration_sentence(found, unit));
         let sentence = sentence(&asked.answer, distance, unit);
+        let sentence = match apart {
+            Some(apart) => format!("{sentence} {apart}"),
+            None => sentence,
+        };
         if let Some(line) = asked.line {
             return results.line(format_args!("line {line}: {sentence}"));
         }

@@ -1,9 +1,10 @@
 //! Prepared meshes and answers about them, as JSON and as text.
 
-use nearmiss::{ContactRegion, Mesh, MeshAnswer, MeshDistance, MeshVerdict};
+use nearmiss::{ContactRegion, Mesh, MeshAnswer, MeshDistance, MeshPenetration, MeshVerdict};
 use serde::Serialize;
 
 use super::contacts::{MeshClashReport, MeshContactReport, MeshContacts};
+use super::penetration::PenetrationReport;
 use crate::answer_report::{AnswerReport, between};
 use crate::digits::{counts, place, work};
 use crate::path_entry::PathVerdict;
@@ -80,6 +81,9 @@ pub(crate) struct MeshAnswerReport {
     region: Option<ContactRegion>,
     /// The triangles that meet at the witness.
     triangles: Option<[u32; 2]>,
+    /// Absent if it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    penetration: Option<Option<PenetrationReport>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     contacts: Option<Vec<MeshContactReport>>,
     /// The groups of contacts, the greatest first.
@@ -88,9 +92,14 @@ pub(crate) struct MeshAnswerReport {
 }
 
 impl MeshAnswerReport {
-    /// Creates the report of an answer, and of all contacts and their completeness if these were
-    /// asked for.
-    pub(crate) fn new(answer: &MeshAnswer, all: Option<(&MeshContacts<'_>, bool)>, micros: f64) -> Self {
+    /// Creates the report of an answer, and of all contacts and their completeness and of the
+    /// penetration if these were asked for.
+    pub(crate) fn new(
+        answer: &MeshAnswer,
+        all: Option<(&MeshContacts<'_>, bool)>,
+        penetration: Option<&MeshPenetration>,
+        micros: f64,
+    ) -> Self {
         let contact = match answer.verdict {
             MeshVerdict::Intersecting(contact) => Some(contact),
             _ => None,
@@ -114,6 +123,7 @@ impl MeshAnswerReport {
                 _ => None,
             },
             triangles: contact.map(|contact| contact.triangles),
+            penetration: penetration.map(PenetrationReport::new),
             contacts,
             clashes: all.map(|(all, _)| all.clashes()),
         }

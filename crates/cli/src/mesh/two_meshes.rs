@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use nearmiss::{Aabb, Budget, Deadline, Mesh, MeshPair, Pose};
+use nearmiss::{Aabb, Budget, Deadline, Mesh, MeshPair, PlacedMesh, Pose};
 
 use crate::console::Console;
 use crate::error::CliError;
@@ -47,7 +47,13 @@ impl TwoMeshes {
         if let Some(end) = self.time.and_then(|time| start.checked_add(time)) {
             budget = budget.with_deadline(Deadline::at(end));
         }
-        MeshPair::new(self.meshes[0].at(&poses[0]), self.meshes[1].at(&poses[1])).within(&budget)
+        let [a, b] = self.placed(poses);
+        MeshPair::new(a, b).within(&budget)
+    }
+
+    /// Places the meshes.
+    pub(crate) fn placed(&self, poses: &[Pose; 2]) -> [PlacedMesh<'_>; 2] {
+        [self.meshes[0].at(&poses[0]), self.meshes[1].at(&poses[1])]
     }
 
     /// Warns about units once if the meshes differ too much in size.

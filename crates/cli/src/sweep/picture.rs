@@ -5,15 +5,17 @@ use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
     DistanceOptions, DistancePlan, Moving, Pair, Placed, Pose, Scratch, SweepAnswer, SweepPlan, SweepVerdict,
 };
+use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, blend};
+use nearmiss_draw::legend;
+use nearmiss_draw::marks::{label, mark, title};
+use nearmiss_draw::picture::Picture;
 
 use super::report::time;
-use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, blend};
 use crate::digits::short;
-use crate::image::Picture;
-use crate::legend;
-use crate::marks::{label, mark, scale_bar_in, title};
 use crate::path_plot::ticks;
-use crate::picture::{GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, Style, dot, splat};
+use crate::picture::{
+    GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, Style, dot, scale_bar_in, splat,
+};
 
 /// The number of intervals at whose ends the clearance is measured.
 const SAMPLES: u32 = 160;

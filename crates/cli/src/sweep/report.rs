@@ -19,7 +19,7 @@ pub(super) struct Report {
     clearance: Option<f64>,
     /// The time of the least distance that was measured.
     clearance_at: Option<f64>,
-    /// That distance.
+    /// The least distance that was measured, from above.
     clearance_upper: Option<f64>,
     reason: Option<&'static str>,
     /// The local spacing of the scans where they were nearest, in world units.

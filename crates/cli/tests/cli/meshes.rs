@@ -85,7 +85,7 @@ fn options_of_scans_do_not_apply_to_meshes() {
     place.refused(2, &["preprocess", "cube.obj", "-o", "cube.nm", "--weld", "0.1"], &["--as-mesh"]);
     for command in ["collide", "distance"] {
         let asked = [command, "cube.obj", "cube.obj", "--as-mesh"];
-        for options in [&["--thickened", "0.1"][..], &["--surface-only"], &["--image", "x.png"]] {
+        for options in [&["--thickened", "0.1"][..], &["--surface-only"]] {
             place.refused(2, &[&asked[..], &["both"], options].concat(), &["--as-mesh", options[0]]);
         }
         let refused = [&asked[..], &["a", "--image", "x.png"]].concat();
@@ -116,6 +116,7 @@ fn options_of_scans_do_not_apply_to_meshes() {
 fn what_is_no_mesh_is_refused_with_the_command_to_use() {
     let place = cubes();
     place.write("points.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 0\n1 0 1\n0 1 1\n1 1 1\n2 2 2\n");
+    place.write("shapes.jsonl", "{\"sphere\":{\"centre\":[3,0,2],\"radius\":0.5}}\n");
     place.ok(&["preprocess", "points.xyz", "-o", "points.nm", "--quiet"]);
     let no_faces = ["points.xyz: expected a mesh, got points without faces", "name a file with faces"];
     place.refused(1, &["preprocess", "points.xyz", "-o", "out.nm", "--as-mesh"], &no_faces);
@@ -123,12 +124,13 @@ fn what_is_no_mesh_is_refused_with_the_command_to_use() {
     let no_mesh = ["points.nm: expected a prepared mesh, got a prepared scan", "`preprocess --as-mesh`"];
     place.refused(1, &["mesh-collide", "cube.nm", "points.nm"], &no_mesh);
     place.refused(1, &["distance", "points.nm", "cube.nm", "--as-mesh", "both"], &no_mesh);
-    let no_scan = ["cube.nm: expected a prepared scan, got a prepared mesh", "`mesh-collide`"];
+    let no_scan = ["cube.nm: expected a prepared scan, got a prepared mesh", "`mesh-collide`", "`sample`"];
     for args in [
         &["collide", "cube.nm", "points.nm"][..],
         &["distance", "points.nm", "cube.nm"],
         &["clash", "cube.nm", "cube.nm"],
         &["curve", "cube.nm", "points.nm", "-o", "curve.ply"],
+        &["touch", "cube.nm", "--shapes", "shapes.jsonl"],
         &["export", "cube.nm", "--points", "p.ply"],
         &["poses", "cube.nm", "points.nm", "--sweep", "-o", "poses.jsonl"],
     ] {
@@ -326,4 +328,70 @@ fn paths_of_meshes_are_answered_in_order_on_any_number_of_threads() {
     let done = place.run(&["mesh-collide", "dragon.nm", "dragon.nm", "--poses", "faulty"]);
     assert!(done.status == 1 && done.results.starts_with("line 1: They touch"), "{}", done.results);
     assert!(done.errors.contains("faulty: line 2: "), "{}", done.errors);
+}
+
+#[test]
+fn a_penetration_tells_how_to_get_meshes_apart() {
+    let place = cubes();
+    let ask = |options: &[&str]| {
+        let asked = ["mesh-collide", "cube.nm", "cube.nm", "--penetration", "--json"];
+        let answer = place.ok(&[&asked[..], options].concat()).json().remove(0);
+        assert_eq!(keys(&answer), sorted(&format!("{FIELDS} penetration")));
+        answer
+    };
+    let deep = ask(&["--pose-b", &shift(1.5, 0.3, 0.2)]);
+    let found = &deep["penetration"];
+    assert_eq!(keys(found), sorted("lower upper direction"));
+    let [lower, upper] = ["lower", "upper"].map(|key| found[key].as_f64().unwrap());
+    assert!(lower > 0.45 && lower <= 0.5 && (0.5..0.5001).contains(&upper), "{deep}");
+    let way = numbers(&found["direction"]);
+    assert!((way[0] - 1.0).abs() < 1e-6, "{deep}");
+    // Moved by that much they are apart.
+    let moved: Vec<f64> = [1.5, 0.3, 0.2].iter().zip(&way).map(|(x, u)| x + upper * u).collect();
+    let apart = ask(&["--pose-b", &shift(moved[0], moved[1], moved[2])]);
+    assert!(apart["verdict"] == "separated" && apart["penetration"].is_null(), "{apart}");
+    // One inside the other overlaps it.
+    let inside = ask(&["--pose-b", "0.5 0 0 0 0 0.5 0 0 0 0 0.5 0 0 0 0 1"]);
+    let depth = inside["penetration"]["upper"].as_f64().unwrap();
+    assert!(inside["verdict"] == "separated" && (1.5..1.5001).contains(&depth), "{inside}");
+    let short = ask(&["--pose-b", &shift(1.5, 0.3, 0.2), "--work", "10"]);
+    assert!(short["penetration"]["complete"] == false, "{short}");
+    assert!(short["penetration"]["upper"].as_f64().unwrap() >= upper, "{short}");
+
+    let asked = ["mesh-collide", "cube.nm", "cube.nm", "--penetration", "--pose-b", &shift(1.5, 0.3, 0.2)];
+    let words = place.ok(&asked).results;
+    assert!(words.contains("Moving b by 0.500"), "{words}");
+    assert!(
+        words.contains(" along (1.00000, 0.00000, 0.00000) separates them; no shift below 0."),
+        "{words}"
+    );
+    place.write("poses.txt", "1.5 0 0 0 0 0 1\n5 0 0 0 0 0 1\n");
+    let many =
+        place.ok(&["mesh-collide", "cube.nm", "cube.nm", "--penetration", "--poses", "poses.txt"]).results;
+    assert_eq!(many.matches("Moving b by").count(), 1, "{many}");
+}
+
+#[test]
+fn pictures_of_meshes_show_contacts_and_gaps() {
+    let place = cubes();
+    for (x, file) in [(1.5, "hit.png"), (3.0, "miss.png")] {
+        let pose = shift(x, 0.3, 0.2);
+        let asked = ["mesh-collide", "cube.nm", "cube.nm", "--pose-b", &pose, "--image", file, "--quiet"];
+        place.ok(&asked);
+        let bytes = std::fs::read(place.path(file)).unwrap();
+        assert!(bytes.starts_with(b"\x89PNG") && bytes.len() > 5000, "{file}: {} bytes", bytes.len());
+    }
+    place.ok(&[
+        "collide",
+        "cube.nm",
+        "cube.nm",
+        "--as-mesh",
+        "both",
+        "--image",
+        "same.png",
+        "--view",
+        "30,20",
+    ]);
+    place.refused(2, &["mesh-collide", "cube.nm", "cube.nm", "--image", "x.jpg"], &["x.jpg", ".png"]);
+    place.refused(2, &["mesh-collide", "cube.nm", "cube.nm", "--view", "30,20"], &["--image"]);
 }

@@ -5,10 +5,10 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::ranges;
 use nearmiss_store::{Check, File, Flaw, LoadError, WriteError, Writer};
 
+use crate::bounds::cells::CELLS;
 use crate::file::sanity::{check_boxes, frame_is_valid, is_in_range};
 use crate::mesh::block::{LEAF_TRIANGLES, TriangleBlock};
 use crate::mesh::build::MeshHierarchy;
-use crate::mesh::cells::CELLS;
 use crate::mesh::data::{MeshArrays, MeshMeta};
 use crate::scan::outline::Ball;
 use crate::tree::topology::Topology;

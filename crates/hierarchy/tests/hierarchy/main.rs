@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod apart;
+mod cells;
 mod coverings;
 mod deforming;
 mod enclosures;

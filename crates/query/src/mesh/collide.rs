@@ -123,6 +123,18 @@ pub(crate) fn collide(
     MeshAnswer { verdict, likelihood, statistics: search.pair.meter.spent }
 }
 
+/// Looks for two triangles that meet. Returns the pair, and breaks if the search was ended, by a
+/// contact or by the budget.
+pub(crate) fn first_met<'a>(
+    pair: MeshPairing<'a>,
+    stack: &mut Stack,
+) -> (MeshPairing<'a>, ControlFlow<()>, Option<[usize; 2]>) {
+    stack.clear();
+    let mut search = Search { pair, met: None, all: None };
+    let flow = search.run(stack);
+    (search.pair, flow, search.met)
+}
+
 impl Search<'_, '_> {
     /// Searches from the pair of the roots on. Breaks if it was ended.
     fn run(&mut self, stack: &mut Stack) -> ControlFlow<()> {

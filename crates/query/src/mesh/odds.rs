@@ -9,7 +9,7 @@ use nearmiss_hierarchy::{
 };
 use nearmiss_lanes::wide::{Bits, bits, product, repeated, spread};
 
-use crate::mesh::cell_table::expected;
+use crate::pair::cell_table::expected;
 
 const LANES: usize = 16;
 

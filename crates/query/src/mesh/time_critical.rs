@@ -14,11 +14,11 @@ use nearmiss_lanes::wide::Bits;
 use nearmiss_mesh::triangles_meet;
 
 use crate::mesh::answer::{MeshAnswer, MeshVerdict};
-use crate::mesh::cell_table::CellTable;
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::odds::{Odds, OddsVisitor};
 use crate::mesh::quality::MeshQuality;
 use crate::mesh::region::region;
+use crate::pair::cell_table::CellTable;
 
 struct Search<'a> {
     pair: MeshPairing<'a>,

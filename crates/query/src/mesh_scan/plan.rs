@@ -30,6 +30,7 @@ impl MeshScanPlan {
             (Method::Interpolation(_), _) => Some("the method `interpolation`"),
             (Method::Traversal, Some(Order::Sides)) => Some("the order `sides`"),
             (Method::Traversal, Some(Order::SidesByGap)) => Some("the order `sides-by-gap`"),
+            (Method::Traversal, Some(Order::Cells)) => Some("the order `cells`"),
             _ => options.coverings.then_some("sphere coverings"),
         };
         if let Some(what) = refused {

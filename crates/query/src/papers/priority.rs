@@ -10,11 +10,14 @@ use nearmiss_hierarchy::{Extent, NodePair, apart as coverings_apart};
 use nearmiss_surface::Status;
 
 use crate::ask::options::Order;
+use crate::pair::cell_table::expected;
+use crate::pair::cell_volume::filled_cells;
 use crate::papers::Papers;
 
 impl Papers<'_, '_> {
-    /// Returns the priority of a pair, lowest first: `share` minus the count of sample points on
-    /// the sides. As `share` is about one at most, it decides between pairs with equal counts.
+    /// Returns the priority of a pair, lowest first: by cells, their negated number; otherwise
+    /// `share` minus the count of sample points on the sides. As `share` is about one at most, it
+    /// decides between pairs with equal counts.
     /// `None` if the coverings are disjoint.
     pub(crate) fn look_closer(&mut self, pair: NodePair, share: f32) -> Option<f32> {
         let (slices_a, slices_b) = (self.search.pair.a, self.search.pair.b);
@@ -33,9 +36,20 @@ impl Papers<'_, '_> {
         let sides = match self.order {
             Order::Sides => self.sides(pair, |_| 1.0),
             Order::SidesByGap => self.sides(pair, eigenvalue_gap),
-            _ => 0.0,
+            Order::Cells => return Some(-self.common_cells(pair)),
+            Order::DepthFirst | Order::Overlap => 0.0,
         };
         Some(share - sides)
+    }
+
+    /// Returns the number of cells that the surfaces of both nodes are expected to fill.
+    fn common_cells(&mut self, pair: NodePair) -> f32 {
+        let (a, b) = (self.search.pair.a, self.search.pair.b);
+        let [of_a, of_b] = &mut self.scratch.cells;
+        let counts = [of_a.get(a, pair.a), of_b.get(b, pair.b)];
+        let volume = a.tree.bounds(pair.a);
+        let other = self.search.pair.relative.moved(&b.tree.bounds(pair.b));
+        expected(filled_cells([&volume, &other], counts))
     }
 
     /// The weighted number of a's sample points on the side of f′_B that has fewer of them.

@@ -19,6 +19,7 @@ mod mesh_worlds;
 mod meshes;
 mod orders;
 mod outputs;
+mod penetration;
 mod shapes;
 mod sparse;
 mod sweeps;

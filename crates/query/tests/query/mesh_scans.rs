@@ -423,6 +423,7 @@ fn the_methods_of_the_papers_are_refused() {
     for refused in [
         options.with_method(Method::Sampling(Sampling::default())),
         options.with_order(Order::Sides),
+        options.with_order(Order::Cells),
         options.with_coverings(true),
     ] {
         assert!(matches!(MeshScanPlan::new(&refused, &scan), Err(PlanError::NotForMeshes(_))));

@@ -14,12 +14,18 @@ type Random = rand_xoshiro::Xoshiro256PlusPlus;
 
 /// A prepared tessellated sphere of radius 1 about the origin.
 fn ball(rings: u32) -> MeshHierarchy {
+    ball_of(1.0, rings)
+}
+
+/// The same with another radius.
+fn ball_of(radius: f64, rings: u32) -> MeshHierarchy {
     let mut vertices = Vec::new();
     for i in 0..=rings {
         let polar = std::f64::consts::PI * f64::from(i) / f64::from(rings);
         for j in 0..2 * rings {
             let around = std::f64::consts::PI * f64::from(j) / f64::from(rings);
-            vertices.push([polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()]);
+            let unit = [polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()];
+            vertices.push(unit.map(|x| radius * x));
         }
     }
     let at = |i: u32, j: u32| i * 2 * rings + j % (2 * rings);
@@ -76,12 +82,6 @@ fn hints_of_meshes_change_no_verdict_and_save_searches() {
             }
             last = Some(pose);
         }
-        // A hint about other things is ignored.
-        let other = ball(5);
-        let pose = Pose::from_translation([1.9, 0.0, 0.0]);
-        let pair = MeshPair::new(PlacedMesh::new(&other, &Pose::IDENTITY), PlacedMesh::new(&mesh, &pose));
-        let (cold, warm) = (pair.collide(scratch.meshes()), pair.collide_hinted(&mut hint, scratch.meshes()));
-        assert_eq!(cold.verdict.is_intersecting(), warm.verdict.is_intersecting(), "another pair");
     }
     assert!(hits > 300 && misses > 300, "{hits} hits, {misses} misses");
     assert!(2 * free > misses, "{free} of {misses} separations without a search");
@@ -143,6 +143,50 @@ fn hints_of_a_mesh_and_a_scan_change_no_verdict() {
         }
     }
     assert!(hits > 300 && misses > 300 && free > 100, "{hits} hits, {misses} misses, {free} free");
+}
+
+#[test]
+fn hints_of_other_things_and_questions_are_ignored() {
+    let (small, large, scan) = (ball_of(0.5, 8), ball(8), scan(CloudKind::Sphere, 600));
+    let scratch = &mut Scratch::default();
+    // Where the small ball is far from the other thing, the large one meets it.
+    let pose = Pose::from_translation([1.8, 0.0, 0.0]);
+    let [first, second] = [&small, &large]
+        .map(|mesh| MeshPair::new(PlacedMesh::new(&large, &Pose::IDENTITY), PlacedMesh::new(mesh, &pose)));
+    let mut hint = MeshHint::default();
+    assert!(first.collide_hinted(&mut hint, scratch.meshes()).verdict.is_separated());
+    assert_eq!(first.collide_hinted(&mut hint, scratch.meshes()).statistics.node_pairs, 0, "not remembered");
+    assert!(second.collide_hinted(&mut hint, scratch.meshes()).verdict.is_intersecting(), "another mesh");
+
+    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let [plan, wide] = [0.0, 0.5].map(|m| MeshScanPlan::new(&options.with_margin(m), &scan).unwrap());
+    let placed = Placed::new(&scan, &Pose::IDENTITY);
+    let pair = |mesh| MeshScanPair::new(placed, PlacedMesh::new(mesh, &pose));
+    let mut hint = MeshScanHint::default();
+    assert!(pair(&small).collide_hinted(&plan, &mut hint, scratch).verdict.is_separated());
+    let again = pair(&small).collide_hinted(&plan, &mut hint, scratch);
+    assert_eq!(again.statistics.node_pairs, 0, "not remembered");
+    let known = hint.clone();
+    assert!(pair(&large).collide_hinted(&plan, &mut hint, scratch).verdict.is_intersecting(), "another mesh");
+    let margin = pair(&small).collide_hinted(&wide, &mut known.clone(), scratch).verdict;
+    assert!(margin.is_intersecting(), "another margin: {margin:?}");
+
+    // On the surface between the points: apart from them, but not from the obstacle.
+    let (tiny, rng) = (ball_of(0.02, 4), &mut rng(2504));
+    let of_points = options.with_semantics(Semantics::Thickened(0.0));
+    let of_points = MeshScanPlan::new(&of_points, &scan).unwrap();
+    let mut between = 0;
+    for _ in 0..100 {
+        let pose = Pose::from_translation(unit_vector(rng));
+        let pair = MeshScanPair::new(placed, PlacedMesh::new(&tiny, &pose));
+        let mut hint = MeshScanHint::default();
+        let is_apart = pair.collide_hinted(&of_points, &mut hint, scratch).verdict.is_separated();
+        let cold = pair.collide(&plan, scratch).verdict.is_intersecting();
+        let warm = pair.collide_hinted(&plan, &mut hint, scratch).verdict.is_intersecting();
+        assert_eq!(cold, warm, "another meaning: {pose:?}");
+        between += u32::from(is_apart && cold);
+    }
+    assert!(between > 20, "{between} between points");
 }
 
 /// The verdicts of a batch on this number of threads.

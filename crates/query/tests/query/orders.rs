@@ -9,7 +9,7 @@ use nearmiss_query::{
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-const ORDERS: [Order; 4] = [Order::DepthFirst, Order::Overlap, Order::Sides, Order::SidesByGap];
+const ORDERS: [Order; 5] = [Order::DepthFirst, Order::Overlap, Order::Sides, Order::SidesByGap, Order::Cells];
 
 fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     let leaf = BuildOptions::default().with_leaf_size(8);

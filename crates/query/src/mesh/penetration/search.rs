@@ -1,0 +1,207 @@
+//! The search for a short shift that separates two solids.
+
+use std::ops::ControlFlow;
+
+use crate::mesh::penetration::contacts::{ContactSurvey, KEPT};
+use crate::mesh::penetration::deepest::deepen;
+use crate::mesh::penetration::probe::{Probe, Vector};
+
+/// A shift that was found to separate the solids.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shift {
+    /// A unit vector.
+    pub(crate) way: Vector,
+    pub(crate) length: f64,
+    /// A shorter length at which the solids were found to meet.
+    meets: f64,
+}
+
+impl Shift {
+    /// The shift by `t`.
+    pub(crate) fn new(t: Vector) -> Self {
+        Self { way: t.try_normalize(0.0).unwrap_or_else(Vector::x), length: t.norm(), meets: 0.0 }
+    }
+
+    /// Returns the shift as a vector.
+    pub(crate) fn vector(&self) -> Vector {
+        self.way * self.length
+    }
+}
+
+/// A shift is replaced by one that is shorter by at least this share.
+const GAIN: f64 = 1.0 / 64.0;
+
+/// The relative error of the length of the final shift along its direction.
+const FINE: f64 = 1e-6;
+
+/// The number of directions that are tried first: of the contacts, of their normals, of the boxes.
+const DIRECTIONS: usize = 3 + 2 * KEPT + 7;
+
+/// Rounds of each refinement.
+const ROUNDS: usize = 8;
+
+/// Sets of directions around the best one that are tried in a row.
+const TURNS: usize = 32;
+
+/// Shares of the way back from the last contact at which a place inside both solids is looked for. The
+/// middle is best for a shallow overlap. A small solid deep inside another one is near an end.
+const WAYS_BACK: [f64; 5] = [0.5, 0.9, 0.1, 0.98, 0.02];
+
+/// A search, and its results so far, which hold whenever it is ended.
+pub(crate) struct Search<'p, 's> {
+    pub(crate) probe: &'p mut Probe<'s>,
+    pub(crate) contacts: &'p mut ContactSurvey,
+    /// The best shift so far.
+    pub(crate) best: Shift,
+    /// The greatest lower bound so far.
+    pub(crate) lower: f64,
+}
+
+impl Search<'_, '_> {
+    /// Shortens the shift and raises the lower bound of solids that meet. Breaks if the budget ends.
+    pub(crate) fn narrow(&mut self) -> ControlFlow<()> {
+        self.probe.contacts(self.contacts)?;
+        self.lower = self.lower.max(self.contacts.least - self.probe.rounding());
+        self.try_directions()?;
+        self.raise()?;
+        for _ in 0..ROUNDS {
+            let before = self.best.length;
+            self.follow_contacts()?;
+            self.turn()?;
+            if self.best.length > before * (1.0 - GAIN) {
+                break;
+            }
+        }
+        self.bisect(FINE)?;
+        self.settle()?;
+        self.raise()
+    }
+
+    /// Projects the best shift onto the directions that separate the last contacts, for gains that the
+    /// other steps do not look for.
+    fn settle(&mut self) -> ControlFlow<()> {
+        for _ in 0..ROUNDS {
+            let Some((_, way)) = self.probe.touch(self.best.way * self.best.meets)? else { break };
+            let reach = way.dot(&self.best.vector());
+            let length = reach * (1.0 + FINE);
+            if reach <= 0.0 || length >= self.best.length || !self.probe.is_apart(way * length)? {
+                break;
+            }
+            self.best = Shift { way, length, meets: reach * (1.0 - FINE) };
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Tries the axes of all contacts, their normals, and the axes of the boxes, in both directions.
+    fn try_directions(&mut self) -> ControlFlow<()> {
+        let mut ways = [Vector::zeros(); DIRECTIONS];
+        // The contacts of a small overlap surround it; the axis of their ring crosses it.
+        let axes = if self.contacts.count > 0 { self.contacts.axes() } else { [Vector::zeros(); 3] };
+        let found = axes.into_iter().chain(self.contacts.normals.iter().flatten().copied());
+        for (way, found) in ways.iter_mut().zip(found.chain(self.probe.axes())) {
+            *way = found;
+        }
+        for way in ways.into_iter().filter_map(|way| way.try_normalize(1e-9)) {
+            self.along(way, 0.0)?;
+            self.along(-way, 0.0)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Tries shifts along `way` of more than `from`, each twice as long as the one before.
+    fn along(&mut self, way: Vector, from: f64) -> ControlFlow<()> {
+        let most = self.best.length * (1.0 - GAIN);
+        let (mut meets, mut length) = (from, from.max(self.best.length / 256.0));
+        while meets < most {
+            length = length.min(most);
+            if self.probe.is_apart(way * length)? {
+                self.best = Shift { way, length, meets };
+                return self.bisect(GAIN);
+            }
+            (meets, length) = (length, 2.0 * length);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Shortens the best shift along its direction, up to a relative error.
+    fn bisect(&mut self, relative: f64) -> ControlFlow<()> {
+        while self.best.length - self.best.meets > relative * self.best.length {
+            let middle = 0.5 * (self.best.length + self.best.meets);
+            if self.probe.is_apart(self.best.way * middle)? {
+                self.best.length = middle;
+            } else {
+                self.best.meets = middle;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Turns the best shift towards the direction that separates the triangles that keep it from
+    /// being shorter.
+    fn follow_contacts(&mut self) -> ControlFlow<()> {
+        for _ in 0..ROUNDS {
+            let before = self.best.length;
+            let Some((_, way)) = self.probe.touch(self.best.way * self.best.meets)? else { break };
+            // As far along it as the best shift reaches, or less.
+            let reach = way.dot(&self.best.vector());
+            if reach <= 0.0 || reach >= before * (1.0 - GAIN) {
+                break;
+            }
+            self.along(way, reach * (1.0 - GAIN))?;
+            if self.best.length > before * (1.0 - GAIN) {
+                break;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Tries directions around the best one, at smaller and smaller angles.
+    fn turn(&mut self) -> ControlFlow<()> {
+        let mut angle = 0.4;
+        for _ in 0..TURNS {
+            if angle < 0.02 {
+                break;
+            }
+            let (way, before) = (self.best.way, self.best.length);
+            let across = way.cross(&if way.x.abs() < 0.6 { Vector::x() } else { Vector::y() }).normalize();
+            let other = way.cross(&across);
+            for k in 0..6_u8 {
+                let (sin, cos) = (std::f64::consts::FRAC_PI_3 * f64::from(k)).sin_cos();
+                let turned = (way + (across * cos + other * sin) * angle).normalize();
+                let length = before * (1.0 - 0.25 * angle * angle).min(1.0 - 0.25 * GAIN);
+                if self.probe.is_apart(turned * length)? {
+                    self.best = Shift { way: turned, length, meets: 0.0 };
+                    self.bisect(0.25 * GAIN)?;
+                    break;
+                }
+            }
+            if self.best.length >= before {
+                angle *= 0.5;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Raises the lower bound.
+    fn raise(&mut self) -> ControlFlow<()> {
+        let (enough, step) = (self.best.length * (1.0 - 2.0 * FINE), 0.125 * self.best.length);
+        // Where the surfaces last touch on the way out, and part of the way back.
+        if let Some((place, _)) = self.probe.touch(self.best.way * self.best.meets)? {
+            // The contact may be at a corner; places towards the centres are within.
+            let centres = self.probe.centres();
+            for share in WAYS_BACK {
+                let start = place - self.best.way * (share * self.best.meets);
+                for to in [start, centres[0], centres[1]] {
+                    if self.lower < enough {
+                        deepen(self.probe, start + (to - start) * 0.1, step, enough, &mut self.lower)?;
+                    }
+                }
+            }
+        }
+        if self.contacts.count > 0 {
+            let start = self.contacts.centre();
+            deepen(self.probe, start, step, enough, &mut self.lower)?;
+        }
+        ControlFlow::Continue(())
+    }
+}
