@@ -23,9 +23,11 @@ use crate::question::Scratch;
 /// let plan = SweepPlan::new(&SweepOptions::default(), &square, &square)?;
 /// let mut scratch = Scratch::default();
 ///
-/// // A square 1 above another one is lowered by 2: it passes through the other one at half time.
+/// // A tilted square 1 above another one is lowered by 2: its lowest edge meets the other one at
+/// // half time.
 /// let lies = Motion::still(Pose::IDENTITY);
-/// let at = |z: f64| Pose::from_translation([0.1, 0.2, z]);
+/// let tilted = Pose::from_axis_angle([1.0, 0.0, 0.0], 0.3);
+/// let at = |z: f64| tilted.with_translation([0.1, 0.2, z]);
 /// let lowered = Motion::through(&[at(1.0), at(-1.0)])?;
 /// let sweep = Sweep::new(square.along(&lies), square.along(&lowered));
 /// let SweepVerdict::Impact { t_free, t_hit, .. } = sweep.first_impact(&plan, &mut scratch).verdict else {
@@ -34,7 +36,7 @@ use crate::question::Scratch;
 /// assert!(t_free < 0.5 && 0.5 - t_free < 0.05 && (t_hit - 0.5).abs() < 0.02);
 ///
 /// // Moved sideways, it stays 1 above.
-/// let sideways = Motion::through(&[at(1.0), Pose::from_translation([5.0, 0.2, 1.0])])?;
+/// let sideways = Motion::through(&[at(1.0), tilted.with_translation([5.0, 0.2, 1.0])])?;
 /// let sweep = Sweep::new(square.along(&lies), square.along(&sideways));
 /// assert!(sweep.first_impact(&plan, &mut scratch).verdict.is_free());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
