@@ -2,6 +2,7 @@
 
 mod animate;
 mod bus;
+mod cast;
 mod clash;
 mod collide;
 mod collide_args;
@@ -80,6 +81,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use animate::{AnimateArgs, AnimateMethod};
 pub use as_mesh::AsMeshName;
 pub use canvas::{Area, Canvas, Colour, FINE};
+pub use cast::CastArgs;
 pub use clap;
 pub use clash::ClashArgs;
 pub use collide_args::{CollideArgs, DetailName, EvidenceName};
@@ -169,7 +171,12 @@ Examples:
 
 const TOUCH_EXAMPLE: &str = "\
 Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} for each shape:
-  nearmiss touch room.nm --shapes robot.jsonl --json";
+  nearmiss touch room.nm --shapes robot.jsonl --json
+  nearmiss touch room.nm --shapes robot.jsonl --surface --margin 0.01";
+
+const CAST_EXAMPLE: &str = "\
+Example; rays.jsonl has a line {\"origin\":[0,0,1],\"direction\":[0,0,-1],\"max\":5} for each ray:
+  nearmiss cast room.nm --rays rays.jsonl --json";
 
 const SAMPLE_EXAMPLES: &str = "\
 Examples:
@@ -221,9 +228,12 @@ pub enum Command {
         after_long_help = "Example:\n  nearmiss distance a.nm b.nm --pose-b \"1 0 0 2  0 1 0 0  0 0 1 0  0 0 0 1\""
     )]
     Distance(DistanceArgs),
-    /// Test spheres, capsules and boxes against the points of a scan
+    /// Test spheres, boxes and other convex shapes against the points or the surface of a scan
     #[command(after_long_help = TOUCH_EXAMPLE)]
     Touch(TouchArgs),
+    /// Find the first place where each of many rays hits a scan
+    #[command(after_long_help = CAST_EXAMPLE)]
+    Cast(CastArgs),
     /// Follow a mesh or scan that deforms from frame to frame, and test it at every query time
     #[command(after_long_help = ANIMATE_EXAMPLES)]
     Animate(AnimateArgs),
@@ -260,6 +270,7 @@ impl Command {
             Self::Curve(args) => vec![&args.pair.a, &args.pair.b],
             Self::Distance(args) => vec![&args.pair.a, &args.pair.b],
             Self::Touch(args) => vec![&args.scan],
+            Self::Cast(args) => vec![&args.scan],
             Self::Animate(args) => {
                 let all = args.frames.iter().chain(&args.against_frames).chain(&args.against);
                 all.map(PathBuf::as_path).collect()
@@ -288,6 +299,7 @@ impl Command {
             Self::Density(args) => density::run(args),
             Self::Distance(args) => distance::run(args),
             Self::Touch(args) => touch::run(args),
+            Self::Cast(args) => cast::run(args),
             Self::Animate(args) => animate::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),

@@ -21,6 +21,11 @@ struct Guide;
 #[doc = include_str!("../../../docs/guide/moving.md")]
 struct MovingGuide;
 
+/// The examples of the guide about shapes and rays compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/shapes.md")]
+struct ShapesGuide;
+
 #[cfg(feature = "filter")]
 pub use nearmiss_filter as filter;
 pub use nearmiss_geometry as geometry;
@@ -55,8 +60,9 @@ pub use nearmiss_query::{
     Evidence, Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself,
     MeshPair, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, Method,
     NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlacedBody, PlacedMesh, PlanError, Prepared,
-    PreparedMesh, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex,
-    Statistics, SurfelSize, Until, Verdict, World, each,
+    PreparedMesh, Proof, Question, Ray, RayAnswer, RayHit, Reason, Refinement, Sampling, Scratch, Semantics,
+    Shape, ShapeAnswer, ShapeContact, ShapeDistance, ShapeHint, ShapeIndex, ShapePlan, ShapeVerdict,
+    Statistics, SupportMap, SurfelSize, Target, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

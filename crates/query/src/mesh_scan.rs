@@ -1,7 +1,6 @@
 //! Queries of a mesh and a scan: collision, all contacts, distance.
 
 pub(crate) mod collide;
-pub(crate) mod disc_triangle;
 pub(crate) mod distance;
 pub(crate) mod hint;
 pub(crate) mod leaves;

@@ -16,6 +16,7 @@ use crate::distance::{Distance, DistancePlan};
 use crate::mesh::pair::MeshScratch;
 use crate::pair::placed::Placed;
 use crate::papers::PapersScratch;
+use crate::solid::scratch::SolidScratch;
 
 /// Working memory of queries, one per thread. Reuse it: a query does not allocate once its scratch
 /// is warm.
@@ -29,6 +30,7 @@ pub struct Scratch {
     pub(crate) distance: crate::distance::Frontier,
     curve: CurveScratch,
     meshes: MeshScratch,
+    pub(crate) solid: SolidScratch,
 }
 
 impl Default for Scratch {
@@ -48,6 +50,7 @@ impl Scratch {
             distance: crate::distance::Frontier::default(),
             curve: CurveScratch::default(),
             meshes: MeshScratch::by_level(level),
+            solid: SolidScratch::default(),
         }
     }
 
