@@ -98,7 +98,7 @@ pub(crate) fn crossings(
     let size = f64::from(bounds.radius() + bounds.reach) + elements.beyond_boxes() + ray.radius;
     let middle = (centre - ray.origin).dot(&ray.direction);
     let off = (centre - ray.at(middle)).norm();
-    if !(off <= size * 1.001) || middle + size < 0.0 || middle - size * 1.001 > ray.max {
+    if off.is_nan() || off > size * 1.001 || middle + size < 0.0 || middle - size * 1.001 > ray.max {
         return elements.of_separation(false);
     }
     let skipped = (middle - 1.01 * size).max(0.0);
@@ -249,7 +249,8 @@ fn refined(
         }
         // f is positive below the surface.
         t += f / cosine;
-        if !((t - start).abs() <= most / cosine.abs()) {
+        let moved = (t - start).abs();
+        if moved.is_nan() || moved > most / cosine.abs() {
             return None;
         }
     }

@@ -59,8 +59,8 @@ pub(crate) fn closest(support: impl Fn(&Vector) -> [Vector; 2], start: Vector) -
     let mut size_sq = v.norm_squared();
     for _ in 0..ROUNDS {
         let square = v.norm_squared();
-        // Zero up to rounding; NaN ends the search, too.
-        if !(square > ROUNDING * ROUNDING * size_sq) {
+        // Zero up to rounding.
+        if square.is_nan() || square <= ROUNDING * ROUNDING * size_sq {
             break;
         }
         let next = vertex(&-v);

@@ -146,7 +146,8 @@ impl PlaceVisitor for Touch<'_, '_> {
             {
                 let within = elements.margin + self.near.solid.radius;
                 for lane in Bits(Elements::within(simd, (&gaps.cells, count), self.near.most)) {
-                    self.doubtful |= !(elements.cell_gap(self.near.solid, first + lane) > within);
+                    let gap = elements.cell_gap(self.near.solid, first + lane);
+                    self.doubtful |= gap.is_nan() || gap <= within;
                 }
             }
         }
