@@ -103,12 +103,6 @@ pub enum Shape<'a> {
     },
 }
 
-/// The lengths of a shape, which must not be negative, and two points that must be finite.
-struct Measures {
-    lengths: [f64; 3],
-    points: [[f64; 3]; 2],
-}
-
 impl Shape<'_> {
     /// Returns the radius about the core, in world units.
     #[must_use]
@@ -124,44 +118,47 @@ impl Shape<'_> {
         }
     }
 
-    /// Returns `true` if no length is negative, infinite or NaN, and all coordinates are finite.
-    pub(crate) fn is_valid(&self) -> bool {
+    /// The lengths in world units, none of which may be negative or NaN.
+    fn lengths(&self) -> [f64; 4] {
         let rounding = self.rounding();
-        let measures = match *self {
-            Self::Sphere { centre, .. } => Measures { lengths: [0.0; 3], points: [centre; 2] },
-            Self::Capsule { ends, .. } => Measures { lengths: [0.0; 3], points: ends },
-            Self::Box { pose, half, .. } => {
-                Measures { lengths: half.map(|h| h * pose.scale()), points: [pose.translation(); 2] }
+        match *self {
+            Self::Box { pose, half: [x, y, z], .. } => {
+                let scale = pose.scale();
+                [x * scale, y * scale, z * scale, rounding]
             }
             Self::Cylinder { pose, half_height, radius, .. }
             | Self::Cone { pose, half_height, radius, .. } => {
                 let scale = pose.scale();
-                Measures {
-                    lengths: [half_height * scale, radius * scale, 0.0],
-                    points: [pose.translation(); 2],
-                }
+                [half_height * scale, radius * scale, 0.0, rounding]
             }
-            Self::Triangle { points: [p, q, r], .. } => {
-                Measures { lengths: [0.0; 3], points: [p, [0, 1, 2].map(|k| q[k] + r[k])] }
-            }
-            Self::Hull { points, .. } => {
-                let all = points.iter().all(|p| p.iter().all(|c| c.is_finite()));
-                return all && !points.is_empty() && rounding >= 0.0 && rounding.is_finite();
-            }
-            Self::Own { map, .. } => Measures { lengths: [0.0; 3], points: [map.centre(); 2] },
-        };
-        let is_length = |l: f64| l >= 0.0 && l.is_finite();
-        is_length(rounding)
-            && measures.lengths.into_iter().all(is_length)
-            && measures.points.iter().flatten().all(|c| c.is_finite())
+            Self::Hull { points: [], .. } => [f64::NAN; 4],
+            _ => [0.0, 0.0, 0.0, rounding],
+        }
     }
 
-    /// A bounding box of the shape in the world, rounding included; `None` if the shape is invalid.
+    /// Returns `true` if no length is negative, infinite or NaN, and all coordinates are finite.
+    pub(crate) fn is_valid(&self) -> bool {
+        let is_finite = |points: &[[f64; 3]]| points.iter().flatten().all(|c| c.is_finite());
+        let are_finite = match *self {
+            Self::Sphere { centre, .. } => is_finite(&[centre]),
+            Self::Capsule { ends, .. } => is_finite(&ends),
+            Self::Box { pose, .. } | Self::Cylinder { pose, .. } | Self::Cone { pose, .. } => {
+                is_finite(&[pose.translation()])
+            }
+            Self::Triangle { points, .. } => is_finite(&points),
+            Self::Hull { points, .. } => is_finite(points),
+            Self::Own { map, .. } => is_finite(&[map.centre()]),
+        };
+        are_finite && self.lengths().iter().all(|&l| l >= 0.0 && l.is_finite())
+    }
+
+    /// A bounding box of the shape in the world, rounding included; `None` if a length is negative or
+    /// NaN, or a hull has no points.
     #[must_use]
     pub fn bounds(&self) -> Option<Aabb> {
         /// Relative rounding error of a corner's coordinates in double precision.
         const ROUNDING: f64 = 4e-15;
-        if !self.is_valid() {
+        if !self.lengths().iter().all(|&l| l >= 0.0) {
             return None;
         }
         let (low, high) = match *self {

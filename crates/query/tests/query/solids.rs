@@ -425,7 +425,7 @@ fn degenerate_shapes_have_answers_and_invalid_ones_touch_nothing() {
         assert_eq!(answer.verdict, ShapeVerdict::Undecided(Reason::Shape), "{shape:?}");
         assert_eq!(target.distance(shape, f64::INFINITY, &mut scratch), None, "{shape:?}");
         target.contacts(shape, &mut contacts, &mut scratch);
-        assert!(contacts.is_empty() && shape.bounds().is_none(), "{shape:?}");
+        assert!(contacts.is_empty(), "{shape:?}: {contacts:?}");
     }
     let far = Shape::Sphere { centre: [1e30, 0.0, 0.0], radius: 1.0 };
     assert!(target.touch(&far, &mut scratch).verdict.is_separated(), "a thing far away");
