@@ -141,6 +141,7 @@ impl<'a> Target<'a> {
         let found = &mut solid.crossings;
         let evidence = crossings(&self.elements, &stored, Wanted::First, (level, &mut *found));
         let hit = next_hit(&self.elements, &stored, found, &mut 0, &mut contact.gathers[0]);
+        let hit = hit.map(|(hit, _)| hit);
         RayAnswer { hit, evidence: hit.map_or(evidence, |hit| hit.evidence) }
     }
 
@@ -157,7 +158,8 @@ impl<'a> Target<'a> {
     }
 
     /// Writes all places where a ray hits the scan to `out`, the nearest first: one for each sheet that
-    /// it crosses, and for each ball.
+    /// it crosses, and for each ball. Of places nearer to each other than 0.3 local radii the first
+    /// counts.
     pub fn cast_all(&self, ray: &Ray, out: &mut Vec<RayHit>, scratch: &mut Scratch) {
         out.clear();
         let Some(stored) = self.ray(ray) else { return };
@@ -165,8 +167,13 @@ impl<'a> Target<'a> {
         let found = &mut solid.crossings;
         let _evidence = crossings(&self.elements, &stored, Wanted::All, (level, &mut *found));
         let mut next = 0;
-        while let Some(hit) = next_hit(&self.elements, &stored, found, &mut next, &mut contact.gathers[0]) {
-            out.push(hit);
+        while let Some((hit, layer)) =
+            next_hit(&self.elements, &stored, found, &mut next, &mut contact.gathers[0])
+        {
+            // Crossings of one sheet may end at the same place once they are moved onto the surface.
+            if out.last().is_none_or(|last| hit.t - last.t > layer) {
+                out.push(hit);
+            }
         }
     }
 

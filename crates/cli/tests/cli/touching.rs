@@ -110,14 +110,15 @@ fn shapes_on_a_floor_have_contacts_with_the_surface() {
         assert!((depth - 0.01).abs() < 1e-3 && numbers(&contacts[0]["normal"])[2] > 0.99, "{line}");
     }
     // Two units higher, nothing touches.
-    let above = [&asked[..5], &["--pose", &shift(0.0, 0.0, -2.0), "--json"]].concat();
+    let lowered = shift(0.0, 0.0, -2.0);
+    let above = [&asked[..5], &["--pose", lowered.as_str(), "--json"]].concat();
     for line in place.ok(&above).json() {
         let (lower, upper) = (line["lower"].as_f64().unwrap(), line["upper"].as_f64().unwrap());
         assert!(line["touches"] == false && line["evidence"] == "certified", "{line}");
         assert!(lower > 1.9 && lower < 1.99 && (upper - 1.99).abs() < 1e-3, "{line}");
         assert_eq!(line["contacts"].as_array().map(Vec::len), Some(0), "{line}");
     }
-    let within = [&asked[..5], &["--pose", &shift(0.0, 0.0, -2.0), "--margin", "2", "--json"]].concat();
+    let within = [&asked[..5], &["--pose", lowered.as_str(), "--margin", "2", "--json"]].concat();
     for line in place.ok(&within).json() {
         let depth = line["contacts"][0]["depth"].as_f64().unwrap();
         assert!(line["touches"] == true && (depth + 1.99).abs() < 1e-3, "{line}");

@@ -129,33 +129,37 @@ pub(crate) fn crossings(
     evidence
 }
 
-/// Returns the first of the crossings from number `next` on that counts, as a hit; sets `next` to the
-/// crossing after those of the same sheet.
+/// Returns the first of the crossings from number `next` on that counts, as a hit, and the thickness of
+/// the sheet there in the world; sets `next` to the crossing after those of the same sheet.
 pub(crate) fn next_hit(
     elements: &Elements<'_>,
     ray: &StoredRay,
     found: &[Crossing],
     next: &mut usize,
     scratch: &mut ViewScratch,
-) -> Option<RayHit> {
-    while let Some(first) = found.get(*next) {
+) -> Option<(RayHit, f64)> {
+    let all = found;
+    while let Some(first) = all.get(*next) {
         let start = *next;
         if !elements.is_disc(first.i) {
             *next += 1;
-            return hit(elements, ray, first, scratch);
+            return hit(elements, ray, first, scratch).map(|hit| (hit, 0.0));
         }
         let layer = f64::from(SLAB * elements.arrays.radii[first.i]);
         let is_same = |it: &&Crossing| (it.t - first.t) * first.cosine.max(GRAZING) <= layer;
-        let count = found[start..].iter().take_while(is_same).count();
+        let count = all[start..].iter().take_while(is_same).count();
         *next += count;
-        let sheet = || found[start..start + count].iter().filter(|it| elements.is_disc(it.i));
+        let sheet = || all[start..start + count].iter().filter(|it| elements.is_disc(it.i));
         let Some(best) = sheet().min_by(|a, b| a.beside.total_cmp(&b.beside)) else { continue };
         let found = hit(elements, ray, best, scratch);
         // In a hole, the point nearest to the ray may be another one.
         let found = found.or_else(|| sheet().find_map(|it| hit(elements, ray, it, scratch)));
-        if found.is_some() {
-            return found;
+        if let Some(found) = found {
+            return Some((found, layer * elements.scale()));
         }
+        // A ball among the crossings of a hole still counts.
+        let is_ball = |it: &Crossing| !elements.is_disc(it.i);
+        *next = start + all[start..start + count].iter().position(is_ball).unwrap_or(count);
     }
     None
 }

@@ -53,8 +53,14 @@ fn contacts_on_a_ball_are_where_they_are() {
                 "noise {noise}: {from_point} from the truth, r {r}"
             );
             for contact in &contacts {
-                assert!((Vector::from(contact.point).norm() - 1.0).abs() < 0.15 * r, "{contact:?}");
-                assert!(angle(contact.normal, contact.point) < 8.0, "noise {noise}: {contact:?}");
+                assert!(
+                    (Vector::from(contact.point).norm() - 1.0).abs() < (0.15 + 2.0 * noise) * r,
+                    "{contact:?}"
+                );
+                assert!(
+                    angle(contact.normal, contact.point) < 8.0 + 40.0 * noise,
+                    "noise {noise}: {contact:?}"
+                );
             }
         }
     }
@@ -223,7 +229,7 @@ fn distances_bracket_the_truth() {
                 "{name}: {found:?} for {truth}"
             );
             assert!(found.upper <= truth + 0.1 * r + band, "{name}: {found:?} for {truth}, r {r}");
-            assert!(found.lower >= 0.9 * truth - 0.7 * r, "{name}: {found:?} for {truth}, r {r}");
+            assert!(found.lower >= 0.9 * truth - 0.7 * r - beyond, "{name}: {found:?} for {truth}, r {r}");
             if truth > r {
                 clear += 1;
                 let verdict = target.touch(&sphere, &mut scratch).verdict;

@@ -318,7 +318,7 @@ fn every_answer_is_that_of_brute_force() {
     let mut seen = [[0; 2]; 7];
     let mut points = Vec::new();
     for (n, kind) in (0_u64..).zip(CloudKind::ALL.iter().cycle().take(42)) {
-        let scan = prepared(*kind, [60, 200, 20][(n % 3) as usize], n, [16, 5, 40][(n % 3) as usize]);
+        let scan = prepared(*kind, [60, 200, 40][(n % 3) as usize], n, [16, 5, 40][(n % 3) as usize]);
         let size = scan.bounds().half_extents().into_iter().fold(0.0, f64::max);
         let scale = [1.0, 1e-3, 1e4][(n / 3 % 3) as usize];
         let pose = rotation(rng).with_scale(scale).with_translation(point_in(rng, 3.0 * size * scale));
