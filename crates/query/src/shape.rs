@@ -197,7 +197,6 @@ impl Placed<'_> {
 
 /// A shape in the stored frame of a scan.
 #[derive(Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "lives on the stack for one query")]
 enum Stored<'a> {
     /// A shape that the index knows, and its radius.
     Skeleton(Skeleton, f64),

@@ -9,10 +9,10 @@ use crate::answer_report::word;
 use crate::console::{Results, now};
 use crate::digits::{place, rough, rounded_down, short};
 use crate::error::CliError;
-use crate::touch::TouchArgs;
+use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 
-/// What is asked about each shape.
+/// The question about each shape.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked {
     semantics: Semantics,

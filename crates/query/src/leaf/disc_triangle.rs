@@ -41,7 +41,11 @@ impl FlatDisc {
         let across = d - self.normal * self.normal.dot(d);
         let square = across.norm_squared();
         // Along the normal all points are equal.
-        if square > 1e-24 * d.norm_squared() { across * (self.radius / square.sqrt()) } else { Vector3::zeros() }
+        if square > 1e-24 * d.norm_squared() {
+            across * (self.radius / square.sqrt())
+        } else {
+            Vector3::zeros()
+        }
     }
 
     /// The nearest points of the disc and a triangle. If they cross, the middle of what they have

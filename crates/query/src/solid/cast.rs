@@ -54,6 +54,13 @@ impl Crossing {
     pub(crate) fn is_sure(&self) -> bool {
         self.beside <= 1.0
     }
+
+    /// The length of the ray in which it may meet other discs of the same sheet: through half the
+    /// thickness of the sheet, and no more than a local radius.
+    fn layer(&self, elements: &Elements<'_>) -> f64 {
+        let radius = f64::from(elements.arrays.radii[self.i]);
+        radius * (f64::from(SLAB) / self.cosine).min(1.0)
+    }
 }
 
 /// The places that a search wants.
@@ -145,8 +152,8 @@ pub(crate) fn next_hit(
             *next += 1;
             return hit(elements, ray, first, scratch).map(|hit| (hit, 0.0));
         }
-        let layer = f64::from(SLAB * elements.arrays.radii[first.i]);
-        let is_same = |it: &&Crossing| (it.t - first.t) * first.cosine.max(GRAZING) <= layer;
+        let layer = first.layer(elements);
+        let is_same = |it: &&Crossing| it.t - first.t <= layer;
         let count = all[start..].iter().take_while(is_same).count();
         *next += count;
         let sheet = || all[start..start + count].iter().filter(|it| elements.is_disc(it.i));
@@ -177,7 +184,7 @@ fn hit(
     let x = ray.at(t);
     let told = |t: f64, point: Vector, normal: Vector, evidence| RayHit {
         t: t * scale,
-        point: elements.to_world(&point),
+        point: elements.in_world(&point),
         normal: elements.turned(&normal),
         source,
         evidence,
@@ -233,7 +240,7 @@ fn refined(
         let x = ray.at(t);
         // A thick ray looks at the surface beside its ball.
         let foot = x - towards * ray.radius;
-        let at = field.evaluate(elements.to_world(&foot));
+        let at = field.evaluate(elements.in_world(&foot));
         if at.status == Status::Outside {
             return None;
         }
@@ -242,7 +249,7 @@ fn refined(
         let f = at.f / scale;
         if f.abs() <= ON_SURFACE * at.bandwidth / scale {
             let is_part =
-                elements.semantics == Semantics::Surface || placed.is_obstacle(i, elements.to_world(&foot));
+                elements.semantics == Semantics::Surface || placed.is_obstacle(i, elements.in_world(&foot));
             let normal = normal * 1.0_f64.copysign(normal.dot(&towards));
             let evidence =
                 if at.status == Status::Ok && is_part { Evidence::Certified } else { Evidence::Estimated };
@@ -325,8 +332,7 @@ impl Cast<'_, '_> {
         match self.wanted {
             Wanted::Any => return ControlFlow::Break(()),
             Wanted::First => {
-                let layer = f64::from(SLAB * elements.arrays.radii[i]) / crossing.cosine.max(GRAZING);
-                let end = (crossing.t + layer).min(ray.max);
+                let end = (crossing.t + crossing.layer(elements)).min(ray.max);
                 if end < self.skipped + f64::from(self.most) {
                     self.limit(end);
                 }

@@ -174,35 +174,38 @@ fn of_triangle([a, b, c]: [&Vector; 3]) -> [f64; 3] {
 
 /// The same of a tetrahedron, and `true` if it contains the origin.
 fn of_tetrahedron(p: &[Vector; 4]) -> ([f64; 4], bool) {
-    let mut best = ([1.0, 0.0, 0.0, 0.0], f64::INFINITY);
-    let mut outside = false;
-    for [i, j, k, opposite] in [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]] {
+    /// Distance of the origin from the point that the weights give, relative to the greatest vertex, up
+    /// to which it counts as inside. In a flat tetrahedron rounding decides the sides.
+    const OFF: f64 = 1e-9;
+    let is_outside = |[i, j, k, opposite]: [usize; 4]| {
         let normal = (p[j] - p[i]).cross(&(p[k] - p[i]));
-        let (origin, other) = (-normal.dot(&p[i]), normal.dot(&(p[opposite] - p[i])));
-        // A flat tetrahedron has no inside.
-        if origin * other > 0.0 {
-            continue;
+        -normal.dot(&p[i]) * normal.dot(&(p[opposite] - p[i])) <= 0.0
+    };
+    let nearest = |is_wanted: &dyn Fn([usize; 4]) -> bool| {
+        let mut best = ([1.0, 0.0, 0.0, 0.0], f64::INFINITY);
+        for [i, j, k, opposite] in [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]] {
+            if is_wanted([i, j, k, opposite]) {
+                let [a, b, c] = of_triangle([&p[i], &p[j], &p[k]]);
+                let square = (p[i] * a + p[j] * b + p[k] * c).norm_squared();
+                if square < best.1 {
+                    let mut weights = [0.0; 4];
+                    (weights[i], weights[j], weights[k]) = (a, b, c);
+                    best = (weights, square);
+                }
+            }
         }
-        outside = true;
-        let [a, b, c] = of_triangle([&p[i], &p[j], &p[k]]);
-        let square = (p[i] * a + p[j] * b + p[k] * c).norm_squared();
-        if square < best.1 {
-            let mut weights = [0.0; 4];
-            (weights[i], weights[j], weights[k]) = (a, b, c);
-            best = (weights, square);
-        }
-    }
-    if outside {
-        return (best.0, false);
+        best
+    };
+    let (weights, square) = nearest(&is_outside);
+    if square < f64::INFINITY {
+        return (weights, false);
     }
     // The weight of a vertex is its share of the volume.
-    let volume = |a: &Vector, b: &Vector, c: &Vector| a.dot(&b.cross(c));
-    let shares = [
-        volume(&p[1], &p[2], &p[3]).abs(),
-        volume(&p[0], &p[2], &p[3]).abs(),
-        volume(&p[0], &p[1], &p[3]).abs(),
-        volume(&p[0], &p[1], &p[2]).abs(),
-    ];
+    let volume = |a: usize, b: usize, c: usize| p[a].dot(&p[b].cross(&p[c])).abs();
+    let shares = [volume(1, 2, 3), volume(0, 2, 3), volume(0, 1, 3), volume(0, 1, 2)];
     let sum: f64 = shares.iter().sum();
-    (shares.map(|share| share / sum), true)
+    let weights = shares.map(|share| share / sum);
+    let off: Vector = (0..4).map(|i| p[i] * weights[i]).sum();
+    let size = p.iter().map(Vector::norm).fold(0.0, f64::max);
+    if off.norm() <= OFF * size { (weights, true) } else { (nearest(&|_| true).0, false) }
 }

@@ -180,7 +180,7 @@ fn refine(
             && (point - disc.centre).norm() > NEAR * radius
         {
             slides -= 1;
-            x = elements.to_world(&point);
+            x = elements.in_world(&point);
             continue;
         }
         if let Some((_, normal, depth)) = deepest(FlatDisc { radius: PLACE * radius, ..disc }) {
@@ -214,7 +214,7 @@ impl Gather<'_, '_> {
         };
         let Some(((point, normal, depth), is_behind)) = found else { return };
         let contact = ShapeContact {
-            point: elements.to_world(&point),
+            point: elements.in_world(&point),
             normal: elements.turned(&normal),
             depth: depth * elements.scale(),
             id: u64::from(elements.placed.scan().id(i).0),

@@ -58,7 +58,7 @@ impl<'s, 'a> Near<'s, 'a> {
 
     /// A distance from the shape for one from the core in single precision.
     #[inline]
-    pub(crate) fn from_shape(&self, gap: f32) -> f64 {
+    pub(crate) fn gap_of_shape(&self, gap: f32) -> f64 {
         if self.lane_box.is_near { f64::from(gap) - self.solid.radius } else { f64::NEG_INFINITY }
     }
 }

@@ -56,7 +56,7 @@ pub(crate) fn distance(
     Some(ShapeDistance {
         lower: lower * scale,
         upper: upper * scale,
-        points: [elements.to_world(&gap.on_disc), elements.to_world(&(gap.on_core + way * share))],
+        points: [elements.in_world(&gap.on_disc), elements.in_world(&(gap.on_core + way * share))],
         source: elements.placed.scan().id(i),
         band: elements.band(i),
         evidence: if is_ball { Evidence::Certified } else { Evidence::Estimated },
@@ -135,7 +135,7 @@ impl PlaceVisitor for Apart<'_, '_> {
             if elements.certifies && elements.semantics == Semantics::Obstacle {
                 let upper = self.lower.min(self.upper);
                 for lane in Bits(Elements::within(simd, (&gaps.cells, count), self.near.most)) {
-                    let by_lanes = self.near.from_shape(gaps.cells[lane]).max(node_gap);
+                    let by_lanes = self.near.gap_of_shape(gaps.cells[lane]).max(node_gap);
                     if by_lanes < upper.min(self.lower) {
                         self.bound(first + lane, by_lanes);
                     }

@@ -280,7 +280,7 @@ impl<'a> Elements<'a> {
     }
 
     /// A point in the world.
-    pub(crate) fn to_world(&self, x: &Vector) -> [f64; 3] {
+    pub(crate) fn in_world(&self, x: &Vector) -> [f64; 3] {
         self.placed.stored_to_world().apply((*x).into())
     }
 

@@ -30,11 +30,11 @@ pub(crate) fn verified_in(
     if !placed.verifies() {
         return None;
     }
-    let (mut x, scale) = (elements.to_world(&start), elements.scale());
+    let (mut x, scale) = (elements.in_world(&start), elements.scale());
     let most = NEARBY * elements.band(i);
     for _ in 0..ROUNDS {
         let foot = project(x, |y| placed.evaluate_near(i, y, scratch));
-        let moved = (Vector3::from(foot.point) - Vector3::from(elements.to_world(&start))).norm();
+        let moved = (Vector3::from(foot.point) - Vector3::from(elements.in_world(&start))).norm();
         if !foot.converged || moved > most {
             return None;
         }
@@ -46,7 +46,7 @@ pub(crate) fn verified_in(
             return is_part.then_some(foot.point);
         }
         let way = (own - on_core).normalize();
-        x = elements.to_world(&(on_core + way * solid.radius));
+        x = elements.in_world(&(on_core + way * solid.radius));
     }
     None
 }

@@ -63,7 +63,7 @@ pub(crate) fn touch(
         band: elements.band(met.i),
     };
     if let Some(met) = search.certified {
-        return touching(met, elements.to_world(&met.point), Evidence::Certified);
+        return touching(met, elements.in_world(&met.point), Evidence::Certified);
     }
     if let Some(first) = search.met[0] {
         if detail == Detail::Witness {
@@ -73,7 +73,7 @@ pub(crate) fn touch(
                 }
             }
         }
-        return touching(first, elements.to_world(&first.point), Evidence::Estimated);
+        return touching(first, elements.in_world(&first.point), Evidence::Estimated);
     }
     let verdict = if search.undersampled {
         ShapeVerdict::Undecided(Reason::Undersampled)

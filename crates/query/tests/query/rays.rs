@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
-use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind, SLAB};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy, SLAB};
 use nearmiss_query::{CollideOptions, Detail, Evidence, Placed, Ray, Scratch, Semantics, ShapePlan, Target};
 use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::instructions::levels;
@@ -16,7 +16,7 @@ struct Met {
     t: f64,
     /// `true` if it meets the disc or ball itself, not only the cell.
     is_sure: bool,
-    /// How far along the ray the same sheet may be met again.
+    /// The distance along the ray within which the same sheet may be met again.
     layer: f64,
 }
 
@@ -86,7 +86,8 @@ fn brute(scan: &Placed<'_>, ray: &Ray, semantics: Semantics) -> Vec<Met> {
         }
         let normal = Vector::from(placed.rotate(arrays.normals[i].map(f64::from))).normalize();
         let radius = f64::from(arrays.discs.get(i)) * placed.scale();
-        let layer = f64::from(SLAB * arrays.radii[i]) * placed.scale() / normal.dot(&d).abs().max(0.02);
+        let layer =
+            f64::from(arrays.radii[i]) * placed.scale() * (f64::from(SLAB) / normal.dot(&d).abs()).min(1.0);
         let sure = if ray.radius > 0.0 {
             first_touch(ray, (p, normal, radius))
         } else {
@@ -101,7 +102,7 @@ fn brute(scan: &Placed<'_>, ray: &Ray, semantics: Semantics) -> Vec<Met> {
         let height = normal.dot(&(o - p));
         let t = (ray.radius.copysign(height) - height) / normal.dot(&d);
         let beside = (o + d * t - normal * ray.radius.copysign(height) - p).norm();
-        if kind == PointKind::Sheet && t >= 0.0 && beside <= cell {
+        if t >= 0.0 && beside <= cell {
             all.push(Met { i, t, is_sure: false, layer });
         }
     }

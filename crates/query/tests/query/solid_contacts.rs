@@ -39,7 +39,7 @@ fn contacts_on_a_ball_are_where_they_are() {
         let (rng, mut contacts) = (&mut rng(3), Vec::new());
         for _ in 0..60 {
             let out = Vector::from(unit_vector(rng));
-            let (radius, depth) = (rng.random_range(0.05..0.5), rng.random_range(0.3..1.0) * r);
+            let (radius, depth) = (rng.random_range(0.1..0.5), rng.random_range(0.3..1.0) * r);
             let centre: [f64; 3] = (out * (1.0 + radius - depth)).into();
             let sphere = Shape::Sphere { centre, radius };
             target.contacts(&sphere, &mut contacts, &mut scratch);
@@ -47,9 +47,11 @@ fn contacts_on_a_ball_are_where_they_are() {
             assert!(angle(deepest.normal, out.into()) < 5.0, "noise {noise}: {deepest:?} for {out:?}");
             assert!((deepest.depth - depth).abs() < 0.2 * r, "noise {noise}: {deepest:?} for {depth}, r {r}");
             assert!((Vector::from(deepest.point).norm() - 1.0).abs() < 0.1 * r, "noise {noise}: {deepest:?}");
+            // Noise tilts the normals by some degrees, and with them the way from the centre.
+            let tilt = if noise > 0.0 { 0.06 } else { 0.0 };
             let from_point = off(deepest.point, out.into());
             assert!(
-                from_point < (0.1 + 2.0 * noise) * r,
+                from_point < 0.1 * r + tilt * radius,
                 "noise {noise}: {from_point} from the truth, r {r}"
             );
             for contact in &contacts {
@@ -247,7 +249,7 @@ fn rays_hit_closed_surfaces_where_they_are() {
         let scan = scanned(shapes::sphere(1.0), 0.05, noise);
         let (r, options) = (scan.sampling_radius(), CollideOptions::default().with_detail(detail));
         let (target, mut scratch) = (target(&scan, &options), Scratch::default());
-        let (rng, mut all, mut certified) = (&mut rng(4), Vec::new(), 0);
+        let (rng, mut all, mut certified, mut exact) = (&mut rng(4), Vec::new(), 0, 0);
         for _ in 0..1500 {
             let (way, start) = (unit_vector(rng), unit_vector(rng).map(|c| 0.3 * c));
             let ray = Ray::new(start, way.map(|c| 7.0 * c));
@@ -257,16 +259,11 @@ fn rays_hit_closed_surfaces_where_they_are() {
             let hit = hit.unwrap_or_else(|| panic!("noise {noise}: {ray:?} passes a closed surface"));
             // Along the ray, errors grow by the inverse cosine.
             let cosine = Vector::from(hit.point).normalize().dot(&d);
-            let most = if detail == Detail::Witness && hit.evidence == Evidence::Certified {
-                0.1
-            } else {
-                0.1 + 3.0 * noise
-            };
-            certified += usize::from(hit.evidence == Evidence::Certified);
-            assert!(
-                (hit.t - truth).abs() * cosine < most * r,
-                "noise {noise}, {detail:?}: {hit:?} for {truth}, r {r}"
-            );
+            let (error, is_certified) = ((hit.t - truth).abs() * cosine, hit.evidence == Evidence::Certified);
+            certified += usize::from(is_certified);
+            exact += usize::from(error < 0.1 * r);
+            let most = if is_certified { 0.1 + 0.5 * noise } else { 0.1 + 3.0 * noise };
+            assert!(error < most * r, "noise {noise}, {detail:?}: {hit:?} for {truth}, r {r}");
             assert!(angle(hit.normal, hit.point) > 168.0, "towards the start: {hit:?}");
             assert!(target.is_hit(&ray, &mut scratch), "{ray:?}");
             assert!(!target.is_hit(&ray.with_max(0.5 * truth), &mut scratch), "{ray:?} ends before");
@@ -284,6 +281,7 @@ fn rays_hit_closed_surfaces_where_they_are() {
             let thick = thick.unwrap_or_else(|| panic!("{ray:?} with a radius passes"));
             assert!((thick - inner).abs() * cosine < 0.2 * r, "noise {noise}: {thick} for {inner}, r {r}");
         }
+        assert!(exact > 1490, "noise {noise}, {detail:?}: {exact} of 1500 within a tenth of r");
         assert!(detail == Detail::Verdict || certified > 1450, "noise {noise}: {certified} certified");
         let beside = Ray::new([-3.0, 1.5, 0.0], [1.0, 0.0, 0.0]);
         let answer = target.cast(&beside, &mut scratch);

@@ -141,7 +141,7 @@ fn to_disc(shape: &Shape<'_>, centre: Vector, normal: Vector, radius: f64) -> f6
     })
 }
 
-/// What brute force says about a shape.
+/// The answer of brute force about a shape.
 struct Brute {
     /// The least distance from any disc or ball.
     apart: f64,
@@ -201,7 +201,7 @@ fn draw<'p>(
 ) -> Shape<'p> {
     let mut length = |most: f64| size * rng.random_range(0.05..most);
     let (half, radius) = ([length(1.0), length(1.0), length(1.0)], length(0.5));
-    let rounding = if which % 2 == 0 { 0.0 } else { 0.5 * radius };
+    let rounding = if which.is_multiple_of(2) { 0.0 } else { 0.5 * radius };
     let pose = rotation(rng).with_translation(centre);
     let near = |rng: &mut Random| {
         let d = point_in(rng, size);
