@@ -166,7 +166,7 @@ impl Placed<'_> {
 
     /// Converts a shape to the stored frame of the scan; `None` if it is invalid.
     #[inline]
-    fn stored<'s>(&self, shape: &Shape<'s>) -> Option<Stored<'s>> {
+    fn stored<'s>(&'s self, shape: &Shape<'s>) -> Option<Stored<'s>> {
         let placed = self.stored_to_world();
         let radius = shape.rounding() / placed.scale();
         let skeleton = match *shape {

@@ -177,7 +177,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    fn solid<'s>(&self, shape: &Shape<'s>) -> Option<Solid<'s>> {
+    fn solid<'s>(&'s self, shape: &Shape<'s>) -> Option<Solid<'s>> {
         Solid::new(shape, self.elements.placed.stored_to_world())
     }
 

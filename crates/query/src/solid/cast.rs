@@ -274,7 +274,8 @@ impl Cast<'_, '_> {
     fn limit(&mut self, t: f64) {
         self.most = (((t - self.skipped) * (1.0 + 1e-6)) as f32).next_up() + self.thick;
         self.most = self.most.max(0.0);
-        self.most_sq = (self.most * self.most).next_up();
+        // Finite, as nodes beside the ray are infinitely far.
+        self.most_sq = (self.most * self.most).next_up().min(f32::MAX);
     }
 
     /// The lanes of the points of a block that the ray passes within their reach.

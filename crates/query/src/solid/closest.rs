@@ -13,7 +13,7 @@ type Vector = Vector3<f64>;
 const ROUNDS: u32 = 64;
 
 /// The search ends once the bounds of the squared distance differ by this share of it.
-const PRECISION: f64 = 1e-12;
+const PRECISION: f64 = 1e-9;
 
 /// Relative rounding error of the difference of two points.
 const ROUNDING: f64 = 1e-15;
@@ -46,8 +46,9 @@ struct Simplex {
 
 /// Finds the nearest points of two convex shapes. `support` returns the point of the first shape
 /// furthest along a direction, and the point of the second furthest against it. `start` is the
-/// difference of any point of the first and any of the second.
-pub(crate) fn closest(support: impl Fn(&Vector) -> [Vector; 2], start: Vector) -> Closest {
+/// difference of any point of the first and any of the second. Ends early once the distance is known to
+/// exceed `beyond`.
+pub(crate) fn closest(support: impl Fn(&Vector) -> [Vector; 2], start: Vector, beyond: f64) -> Closest {
     let vertex = |towards: &Vector| {
         let points = support(towards);
         Vertex { points, apart: points[0] - points[1] }
@@ -66,7 +67,7 @@ pub(crate) fn closest(support: impl Fn(&Vector) -> [Vector; 2], start: Vector) -
         let next = vertex(&-v);
         let along = v.dot(&next.apart);
         lower = lower.max(along / square.sqrt());
-        if square - along <= PRECISION * square || simplex.has(&next.apart) {
+        if square - along <= PRECISION * square || lower > beyond || simplex.has(&next.apart) {
             break;
         }
         size_sq = size_sq.max(next.apart.norm_squared());

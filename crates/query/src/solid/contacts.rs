@@ -158,8 +158,9 @@ fn refine(
     let (placed, band) = (&elements.placed, elements.band(i));
     let frame = placed.stored_to_world();
     let radius = f64::from(elements.arrays.discs.get(i));
-    let deepest =
-        |disc: FlatDisc| of_disc(solid, &solid.gap(&disc), &disc, (disc.normal, false, elements.margin));
+    let deepest = |disc: FlatDisc| {
+        of_disc(solid, &solid.gap(&disc, f64::INFINITY), &disc, (disc.normal, false, elements.margin))
+    };
     let (mut x, own) = (contact.point, Vector::from(contact.normal));
     let mut slides = slides;
     loop {
@@ -199,7 +200,7 @@ impl Gather<'_, '_> {
         if elements.is_doubtful(i) {
             return;
         }
-        let (gap, thick) = elements.gap(solid, i);
+        let (gap, thick) = elements.gap(solid, i, elements.margin);
         if gap.distance > solid.radius + elements.margin.max(thick) {
             return;
         }
@@ -291,10 +292,14 @@ fn deepest(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Place {
     if across.norm_squared() <= disc.radius * disc.radius {
         return (disc.centre + across, out, depth + solid.radius);
     }
+    if let Some(lowest) = solid.lowest_over(disc, &out) {
+        let height = out.dot(&(lowest - disc.centre));
+        return (lowest - out * height, out, solid.radius - height);
+    }
     let mut place = disc.centre;
     for _ in 0..ROUNDS {
         let below = FlatDisc { centre: disc.centre - out * depth, ..*disc };
-        let gap = solid.gap(&below);
+        let gap = solid.gap(&below, f64::INFINITY);
         place = gap.on_disc + out * depth;
         let rise = out.dot(&(gap.on_core - gap.on_disc));
         if gap.distance <= PRECISION * disc.radius || rise <= PRECISION * gap.distance {

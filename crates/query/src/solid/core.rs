@@ -21,8 +21,8 @@ enum Core<'a> {
     /// A truncated cone about the second axis of the bounding box, with these radii below and above.
     Round([f64; 2]),
     Triangle([Vector; 3]),
-    Hull(&'a [[f64; 3]], Pose),
-    Own(&'a dyn SupportMap, Pose),
+    Hull(&'a [[f64; 3]], &'a Pose),
+    Own(&'a dyn SupportMap, &'a Pose),
 }
 
 /// A convex shape in the stored frame of a scan.
@@ -68,7 +68,7 @@ impl From<Closest> for Gap {
 impl<'a> Solid<'a> {
     /// Moves a shape into a stored frame, whose pose in the world is `placed`. `None` if the shape is
     /// invalid.
-    pub(crate) fn new(shape: &Shape<'a>, placed: &Pose) -> Option<Self> {
+    pub(crate) fn new(shape: &Shape<'a>, placed: &'a Pose) -> Option<Self> {
         if !shape.is_valid() {
             return None;
         }
@@ -115,10 +115,10 @@ impl<'a> Solid<'a> {
             Shape::Hull { points, .. } => {
                 let of = |d: &Vector| extreme(points.iter().map(|&p| into(p)), d);
                 let (centre, half) = spanned(&upright, of);
-                (Core::Hull(points, *placed), centre, upright, half)
+                (Core::Hull(points, placed), centre, upright, half)
             }
             Shape::Own { map, .. } => {
-                let core = Core::Own(map, *placed);
+                let core = Core::Own(map, placed);
                 let probe = Self {
                     core,
                     radius,
@@ -158,6 +158,28 @@ impl<'a> Solid<'a> {
     fn ends(&self) -> [Vector; 2] {
         let along = self.axes[0] * self.half.x;
         [self.centre - along, self.centre + along]
+    }
+
+    /// The lowest place, against `out`, of a core that is a segment within the cylinder over a disc with
+    /// that axis. `None` if the core is no segment, or is beside the cylinder.
+    pub(crate) fn lowest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
+        if !matches!(self.core, Core::Segment) {
+            return None;
+        }
+        let [p, q] = self.ends();
+        let across = |v: Vector| v - out * out.dot(&v);
+        let (from, way) = (across(p - disc.centre), across(q - p));
+        let (a, b) = (way.norm_squared(), from.dot(&way));
+        let c = from.norm_squared() - disc.radius * disc.radius;
+        let (low, high) = if a > 0.0 {
+            let root = (b * b - a * c).max(0.0).sqrt();
+            (((-b - root) / a).max(0.0), ((-b + root) / a).min(1.0))
+        } else {
+            (0.0, 1.0)
+        };
+        let is_over = low <= high && (a == 0.0 && c <= 0.0 || b * b >= a * c);
+        let lower = if out.dot(&(q - p)) < 0.0 { high } else { low };
+        is_over.then(|| p + (q - p) * lower)
     }
 
     /// The point of the core furthest along `d`.
@@ -208,7 +230,7 @@ impl<'a> Solid<'a> {
             Core::Hull(..) | Core::Own(..) => {
                 // Relative to x, so that rounding is relative to the distance.
                 let support = |d: &Vector| [self.support(d) - x, Vector::zeros()];
-                x + closest(support, self.inside - x).points[0]
+                x + closest(support, self.inside - x, f64::INFINITY).points[0]
             }
         }
     }
@@ -218,8 +240,8 @@ impl<'a> Solid<'a> {
         (x - self.nearest(x)).norm()
     }
 
-    /// The nearest points of the core and a disc.
-    pub(crate) fn gap(&self, disc: &FlatDisc) -> Gap {
+    /// The nearest points of the core and a disc; any two points if their distance exceeds `beyond`.
+    pub(crate) fn gap(&self, disc: &FlatDisc, beyond: f64) -> Gap {
         match self.core {
             Core::Point => Gap::of(self.centre, disc.nearest(&self.centre)),
             Core::Segment => {
@@ -231,13 +253,44 @@ impl<'a> Solid<'a> {
                 let found = disc.nearest_to(&corners.map(Into::into));
                 Gap::of(found.on_triangle, found.on_disc)
             }
-            Core::Box | Core::Round(_) | Core::Hull(..) | Core::Own(..) => {
-                let centre = disc.centre;
-                let support = |d: &Vector| [self.support(d) - centre, disc.rim(&-d)];
-                let Closest { points, distance, lower } = closest(support, self.inside - centre);
-                Closest { points: points.map(|p| p + centre), distance, lower }.into()
+            Core::Box | Core::Round(_) => {
+                self.projected(disc).unwrap_or_else(|start| self.iterated(disc, start, beyond))
+            }
+            Core::Hull(..) | Core::Own(..) => self.iterated(disc, self.inside - disc.centre, beyond),
+        }
+    }
+
+    /// The nearest points of the core and a disc, if each is soon the point nearest to the other.
+    /// Otherwise the difference of the last two.
+    fn projected(&self, disc: &FlatDisc) -> Result<Gap, Vector> {
+        const ROUNDS: u32 = 3;
+        /// In disc radii.
+        const SAME: f64 = 1e-10;
+        let mut on_core = self.nearest(&disc.centre);
+        for _ in 0..ROUNDS {
+            let on_disc = disc.nearest(&on_core);
+            let next = self.nearest(&on_disc);
+            let is_same = (next - on_core).norm_squared() <= (SAME * disc.radius).powi(2);
+            on_core = next;
+            if is_same {
+                let way = on_core - on_disc;
+                let distance = way.norm();
+                // From the plane across the way between them.
+                let apart = self.support(&-way) - disc.centre - disc.rim(&way);
+                let lower = if distance > 0.0 { way.dot(&apart) / distance } else { 0.0 };
+                return Ok(Gap { distance, lower: lower.clamp(0.0, distance), on_core, on_disc });
             }
         }
+        Err(on_core - disc.nearest(&on_core))
+    }
+
+    /// The nearest points of the core and a disc by their support maps.
+    fn iterated(&self, disc: &FlatDisc, start: Vector, beyond: f64) -> Gap {
+        // Relative to the centre of the disc, so that rounding is relative to the distance.
+        let centre = disc.centre;
+        let support = |d: &Vector| [self.support(d) - centre, disc.rim(&-d)];
+        let Closest { points, distance, lower } = closest(support, start, beyond);
+        Closest { points: points.map(|p| p + centre), distance, lower }.into()
     }
 }
 

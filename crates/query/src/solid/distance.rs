@@ -70,7 +70,7 @@ impl Apart<'_, '_> {
         if elements.is_doubtful(i) {
             return ControlFlow::Continue(());
         }
-        let (gap, thick) = elements.gap(solid, i);
+        let (gap, thick) = elements.gap(solid, i, self.upper);
         let distance = gap.distance - solid.radius;
         let distance = if distance <= thick { 0.0 } else { distance };
         if distance < self.upper {

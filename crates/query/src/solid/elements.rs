@@ -161,10 +161,14 @@ impl<'a> Elements<'a> {
     }
 
     /// The nearest points of a core and the part of a point, less its ball. Also the distance up to
-    /// which they meet without a margin.
-    pub(crate) fn gap(&self, solid: &Solid<'_>, i: usize) -> (Gap, f64) {
+    /// which they meet without a margin. If the shape is further away than `most` and than that, any
+    /// distance that exceeds both.
+    pub(crate) fn gap(&self, solid: &Solid<'_>, i: usize, most: f64) -> (Gap, f64) {
         match self.element(i) {
-            Element::Disc(disc) => (solid.gap(&disc), f64::from(THICKNESS) * disc.radius),
+            Element::Disc(disc) => {
+                let thick = f64::from(THICKNESS) * disc.radius;
+                (solid.gap(&disc, solid.radius + most.max(thick)), thick)
+            }
             Element::Ball(centre, radius) => {
                 let on_core = solid.nearest(&centre);
                 let away = on_core - centre;
@@ -185,7 +189,9 @@ impl<'a> Elements<'a> {
             return by_ball;
         }
         let disc = FlatDisc { centre, normal: self.normal(i), radius: reach };
-        by_ball.max(solid.gap(&disc).lower - f64::from(SLAB * self.arrays.radii[i]) * (1.0 + 1e-6))
+        by_ball.max(
+            solid.gap(&disc, f64::INFINITY).lower - f64::from(SLAB * self.arrays.radii[i]) * (1.0 + 1e-6),
+        )
     }
 
     /// Compares a core with the points of a block of a leaf, given by its number.

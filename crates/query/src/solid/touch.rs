@@ -87,7 +87,7 @@ impl Touch<'_, '_> {
     /// Compares the shape with the part of a point.
     fn compare(&mut self, i: usize) -> ControlFlow<()> {
         let Near { elements, solid, .. } = self.near;
-        let (gap, thick) = elements.gap(solid, i);
+        let (gap, thick) = elements.gap(solid, i, elements.margin);
         if gap.distance > solid.radius + elements.margin.max(thick) {
             return ControlFlow::Continue(());
         }
