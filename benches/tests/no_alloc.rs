@@ -8,7 +8,8 @@ use nearmiss::{
     Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves,
     Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interpolation, ManifoldPoint,
     Mesh, MeshBuildOptions, MeshPair, MeshScanPair, MeshScanPlan, MeshSolid, Method, Motion, Pair, Paths,
-    Pose, Prepared, Scan, Scratch, Semantics, Sweep, SweepOptions, SweepPlan, SweepVerdict, Verdict,
+    Pose, Prepared, Ray, Scan, Scratch, Semantics, Shape, ShapeHint, ShapePlan, Sweep, SweepOptions,
+    SweepPlan, SweepVerdict, Target, Verdict,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -159,6 +160,36 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     let before = ALLOCATOR.calls();
     assert_eq!(sweep_all(), first, "sweeps depend on the scratch");
     assert_eq!(ALLOCATOR.calls() - before, 0, "sweeps allocated");
+    let shapes = [CollideOptions::default(), options.with_margin(object.r)];
+    let shapes = shapes.map(|options| ShapePlan::new(&options, &scan).unwrap());
+    let (mut hint, mut places, mut hits) = (ShapeHint::default(), Vec::new(), Vec::new());
+    let mut touch_all = || {
+        let mut sum = 0;
+        for (plan, pose) in shapes.iter().cycle().zip(&poses) {
+            let target = Target::new(scan.at(&Pose::IDENTITY), plan);
+            let centre = pose.translation();
+            let solids = [
+                Shape::Sphere { centre, radius: object.r },
+                Shape::Box { pose: *pose, half: [3.0 * object.r; 3], radius: 0.0 },
+            ];
+            for solid in &solids {
+                sum += usize::from(target.touch(solid, &mut scratch).verdict.is_touching());
+                sum += usize::from(target.distance(solid, f64::INFINITY, &mut scratch).is_some());
+                target.contacts_hinted(solid, &mut hint, &mut places, &mut scratch);
+                sum += places.len();
+            }
+            let ray = Ray::new(centre.map(|c| 3.0 * c), centre.map(|c| -c));
+            target.cast_all(&ray, &mut hits, &mut scratch);
+            sum += hits.len() + usize::from(target.cast(&ray, &mut scratch).hit.is_some());
+        }
+        hint.clear();
+        sum
+    };
+    let first = touch_all();
+    let before = ALLOCATOR.calls();
+    assert_eq!(touch_all(), first, "shapes depend on the scratch");
+    assert_eq!(ALLOCATOR.calls() - before, 0, "shapes and rays allocated");
+    assert!(first > 100, "{first} contacts and hits");
 
     let mesh = Mesh::build(object.mesh.as_ref().unwrap(), &MeshBuildOptions::default()).unwrap();
     let distance = DistancePlan::against_mesh(&DistanceOptions::default(), &scan).unwrap();

@@ -299,6 +299,7 @@ fn touches(a: &Scan, question: &Question) -> u32 {
         Shape::Box {
             pose: Pose::IDENTITY.with_translation(centre),
             half: [0.2 * size, 0.1 * size, 0.05 * size],
+            radius: 0.0,
         },
     ];
     let index = ShapeIndex::new(a);

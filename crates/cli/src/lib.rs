@@ -2,6 +2,7 @@
 
 mod animate;
 mod bus;
+mod cast;
 mod clash;
 mod collide;
 mod collide_args;
@@ -75,6 +76,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use animate::{AnimateArgs, AnimateMethod};
 pub use as_mesh::AsMeshName;
+pub use cast::CastArgs;
 pub use clap;
 pub use clash::ClashArgs;
 pub use collide_args::{CollideArgs, DetailName, EvidenceName};
@@ -171,7 +173,12 @@ Examples; a line of path.jsonl is {\"b\":[16 numbers]}, or x y z qx qy qz qw:
 
 const TOUCH_EXAMPLE: &str = "\
 Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} for each shape:
-  nearmiss touch room.nm --shapes robot.jsonl --json";
+  nearmiss touch room.nm --shapes robot.jsonl --json
+  nearmiss touch room.nm --shapes robot.jsonl --surface --margin 0.01";
+
+const CAST_EXAMPLE: &str = "\
+Example; rays.jsonl has a line {\"origin\":[0,0,1],\"direction\":[0,0,-1],\"max\":5} for each ray:
+  nearmiss cast room.nm --rays rays.jsonl --json";
 
 const SAMPLE_EXAMPLES: &str = "\
 Examples:
@@ -226,9 +233,12 @@ pub enum Command {
     /// Decide whether a whole motion is free, and find the first impact otherwise
     #[command(after_long_help = SWEEP_EXAMPLES)]
     Sweep(SweepArgs),
-    /// Test spheres, capsules and boxes against the points of a scan
+    /// Test spheres, boxes and other convex shapes against the points or the surface of a scan
     #[command(after_long_help = TOUCH_EXAMPLE)]
     Touch(TouchArgs),
+    /// Find the first place where each of many rays hits a scan
+    #[command(after_long_help = CAST_EXAMPLE)]
+    Cast(CastArgs),
     /// Follow a mesh or scan that deforms from frame to frame, and test it at every query time
     #[command(after_long_help = ANIMATE_EXAMPLES)]
     Animate(AnimateArgs),
@@ -266,6 +276,7 @@ impl Command {
             Self::Distance(args) => vec![&args.pair.a, &args.pair.b],
             Self::Sweep(args) => vec![&args.pair.a, &args.pair.b],
             Self::Touch(args) => vec![&args.scan],
+            Self::Cast(args) => vec![&args.scan],
             Self::Animate(args) => {
                 let all = args.frames.iter().chain(&args.against_frames).chain(&args.against);
                 all.map(PathBuf::as_path).collect()
@@ -295,6 +306,7 @@ impl Command {
             Self::Distance(args) => distance::run(args),
             Self::Sweep(args) => sweep::run(args),
             Self::Touch(args) => touch::run(args),
+            Self::Cast(args) => cast::run(args),
             Self::Animate(args) => animate::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),

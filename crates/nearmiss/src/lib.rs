@@ -25,6 +25,10 @@ struct MovingGuide;
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/motions.md")]
 struct MotionsGuide;
+/// The examples of the guide about shapes and rays compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/shapes.md")]
+struct ShapesGuide;
 
 #[cfg(feature = "filter")]
 pub use nearmiss_filter as filter;
@@ -62,9 +66,10 @@ pub use nearmiss_query::{
     Evidence, Interpolation, ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself,
     MeshPair, MeshPenetration, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan, MeshScanSweep,
     MeshScratch, MeshSolid, MeshVerdict, Method, Moving, NearestPoint, Order, Pacer, Pair, PairHint, Placed,
-    PlacedBody, PlacedMesh, PlanError, Prepared, PreparedMesh, Proof, Question, Reason, Refinement, Sampling,
-    Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize, Sweep, SweepAnswer, SweepOptions,
-    SweepPlan, SweepReason, SweepVerdict, Until, Verdict, World, each,
+    PlacedBody, PlacedMesh, PlanError, Prepared, PreparedMesh, Proof, Question, Ray, RayAnswer, RayHit,
+    Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeAnswer, ShapeContact, ShapeDistance,
+    ShapeHint, ShapeIndex, ShapePlan, ShapeVerdict, Statistics, SupportMap, SurfelSize, Sweep, SweepAnswer,
+    SweepOptions, SweepPlan, SweepReason, SweepVerdict, Target, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -3,6 +3,7 @@
 pub(crate) mod ball_pair;
 pub(crate) mod crossing;
 pub(crate) mod disc_pair;
+pub(crate) mod disc_triangle;
 pub(crate) mod nearest_points;
 pub(crate) mod point_gap;
 pub(crate) mod point_pair;

@@ -2,7 +2,6 @@
 
 pub(crate) mod collide;
 pub(crate) mod course;
-pub(crate) mod disc_triangle;
 pub(crate) mod distance;
 pub(crate) mod hint;
 pub(crate) mod leaves;

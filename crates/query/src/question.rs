@@ -17,6 +17,7 @@ use crate::mesh::pair::MeshScratch;
 use crate::motion::advance::MotionScratch;
 use crate::pair::placed::Placed;
 use crate::papers::PapersScratch;
+use crate::solid::scratch::SolidScratch;
 
 /// Working memory of queries, one per thread. Reuse it: a query does not allocate once its scratch
 /// is warm.
@@ -31,6 +32,7 @@ pub struct Scratch {
     curve: CurveScratch,
     meshes: MeshScratch,
     pub(crate) motion: MotionScratch,
+    pub(crate) solid: SolidScratch,
 }
 
 impl Default for Scratch {
@@ -51,6 +53,7 @@ impl Scratch {
             curve: CurveScratch::default(),
             meshes: MeshScratch::by_level(level),
             motion: MotionScratch::default(),
+            solid: SolidScratch::default(),
         }
     }
 

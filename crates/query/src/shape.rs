@@ -1,4 +1,4 @@
-//! Spheres, capsules and boxes tested against the points of a scan.
+//! Convex shapes tested against the points of a scan.
 //!
 //! A shape touches a scan if it contains a point of it, for example when a robot made of spheres is
 //! tested against a depth frame. Points are stored in blocks of sixteen, with bounds about the
@@ -8,67 +8,15 @@
 use std::ops::ControlFlow;
 
 use fearless_simd::{Level, Simd};
+use nearmiss_geometry::PointId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{Aabb, PointId, Pose};
 use nearmiss_hierarchy::{PlaceVisitor, ScanArrays};
 use nearmiss_index::Skeleton;
 
 use crate::pair::placed::Placed;
 use crate::pair::shape_index::ShapeIndex;
-
-/// A shape in world coordinates. Radii and half edge lengths must not be negative: a shape with a
-/// negative or NaN size touches nothing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum Shape {
-    /// All points within `radius` of `centre`.
-    Sphere {
-        /// The centre.
-        centre: [f64; 3],
-        /// The radius.
-        radius: f64,
-    },
-    /// All points within `radius` of a segment.
-    Capsule {
-        /// The end points of the segment.
-        ends: [[f64; 3]; 2],
-        /// The radius about the segment.
-        radius: f64,
-    },
-    /// A solid box.
-    Box {
-        /// The pose of the box, which maps an axis-aligned box about the origin to the world. Its
-        /// scale applies.
-        pose: Pose,
-        /// Half the edge lengths, before the pose is applied.
-        half: [f64; 3],
-    },
-}
-
-impl Shape {
-    /// A bounding box of the shape in the world, rounding included; `None` if a size is negative or NaN.
-    #[must_use]
-    pub fn bounds(&self) -> Option<Aabb> {
-        /// Relative rounding error of a corner's coordinates in double precision.
-        const ROUNDING: f64 = 4e-15;
-        let (centres, half): ([[f64; 3]; 2], [f64; 3]) = match *self {
-            Self::Sphere { centre, radius } => ([centre; 2], [radius; 3]),
-            Self::Capsule { ends, radius } => (ends, [radius; 3]),
-            Self::Box { pose, half } => {
-                let turn = pose.rotation();
-                let reach = |k: usize| (0..3).map(|j| (turn[(k, j)] * half[j]).abs()).sum::<f64>();
-                ([pose.translation(); 2], [0, 1, 2].map(|k| reach(k) * pose.scale()))
-            }
-        };
-        let [p, q] = centres;
-        let more = [0, 1, 2].map(|k| half[k] + ROUNDING * (p[k].abs() + q[k].abs() + half[k]));
-        let bounds = Aabb {
-            min: [0, 1, 2].map(|k| p[k].min(q[k]) - more[k]),
-            max: [0, 1, 2].map(|k| p[k].max(q[k]) + more[k]),
-        };
-        half.iter().all(|&h| h >= 0.0).then_some(bounds)
-    }
-}
+use crate::solid::core::Solid;
+use crate::solid::shape::Shape;
 
 /// The point of a scan nearest to a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,15 +25,16 @@ pub struct NearestPoint {
     pub source: PointId,
     /// The position of the point in the world.
     pub point: [f64; 3],
-    /// The distance from the shape, in world units. Negative inside a sphere or capsule, 0 inside a
-    /// box.
+    /// The distance from the shape, in world units. Negative by up to the radius in a rounded shape:
+    /// the radius less the distance from the core.
     pub gap: f64,
 }
 
 impl Placed<'_> {
     /// Returns `true` if a point of the scan is inside `shape` or on its boundary. Exact: the
     /// result equals that of testing each point in double precision in the stored frame of the scan
-    /// ([`Skeleton::distance_sq`]).
+    /// ([`Skeleton::distance_sq`]). The distance from a hull or a shape of the caller's own comes
+    /// from an iteration, with a relative error of about 1e-12.
     ///
     /// With [a shape index](Self::with_shapes) a small sphere compares about five blocks of points,
     /// and other shapes about ten groups of boxes (benches/record). Without one, the search
@@ -94,11 +43,13 @@ impl Placed<'_> {
     /// Does not allocate.
     #[inline]
     #[must_use]
-    pub fn touches(&self, shape: &Shape) -> bool {
-        let (skeleton, radius) = self.stored(shape);
-        match self.shapes() {
-            Some(index) => self.holds(index, (&skeleton, radius), near(index, &skeleton, radius)),
-            None => radius >= 0.0 && self.nearest_within(&skeleton, radius, true).is_some(),
+    pub fn touches(&self, shape: &Shape<'_>) -> bool {
+        let Some(stored) = self.stored(shape) else { return false };
+        match (self.shapes(), &stored) {
+            (Some(index), Stored::Skeleton(skeleton, radius)) => {
+                self.holds(index, (skeleton, *radius), near(index, skeleton, *radius))
+            }
+            _ => self.nearest_within(&stored, stored.radius(), true).is_some(),
         }
     }
 
@@ -107,16 +58,18 @@ impl Placed<'_> {
     /// Inside a sphere or capsule, the nearest point is the one nearest to the centre or the
     /// segment.
     #[must_use]
-    pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
-        let (skeleton, radius) = self.stored(shape);
-        let scale = self.stored_to_world().scale();
+    pub fn nearest(&self, shape: &Shape<'_>, reach: f64) -> Option<NearestPoint> {
+        let stored = self.stored(shape)?;
+        let (radius, scale) = (stored.radius(), self.stored_to_world().scale());
         let reach = radius + reach / scale;
-        if !(radius >= 0.0 && reach >= 0.0) {
-            return None;
-        }
-        let (i, distance_sq) = match self.shapes() {
-            Some(index) => index.tree(self.scan()).nearest_to(index.level, &skeleton, reach),
-            None => self.nearest_within(&skeleton, reach, false),
+        // False for NaN.
+        let is_reach = reach >= 0.0;
+        let (i, distance_sq) = match (self.shapes(), &stored) {
+            _ if !is_reach => None,
+            (Some(index), Stored::Skeleton(skeleton, _)) => {
+                index.tree(self.scan()).nearest_to(index.level, skeleton, reach)
+            }
+            _ => self.nearest_within(&stored, reach, false),
         }?;
         let gap = (distance_sq.sqrt() - radius) * scale;
         Some(NearestPoint { source: self.scan().id(i), point: self.point(i), gap })
@@ -125,7 +78,7 @@ impl Placed<'_> {
     /// Tests each of `shapes` on the threads of the current rayon pool: sets `answers[i]` to `true`
     /// if `shapes[i]` [touches](Self::touches) the scan. If the slices differ in length, the rest
     /// of the longer one is ignored.
-    pub fn touch_each(&self, shapes: &[Shape], answers: &mut [bool]) {
+    pub fn touch_each(&self, shapes: &[Shape<'_>], answers: &mut [bool]) {
         /// Shapes per task of a thread: about 50 µs of work.
         #[cfg(feature = "rayon")]
         const AT_ONCE: usize = 1024;
@@ -141,7 +94,7 @@ impl Placed<'_> {
         self.touch_in_turn(shapes, answers);
     }
 
-    fn touch_in_turn(&self, shapes: &[Shape], answers: &mut [bool]) {
+    fn touch_in_turn(&self, shapes: &[Shape<'_>], answers: &mut [bool]) {
         /// Shapes whose cells are looked up before the first of them is tested, so that the memory
         /// accesses overlap.
         const TOGETHER: usize = 16;
@@ -151,14 +104,21 @@ impl Placed<'_> {
             }
             return;
         };
-        let mut looked_up = [(Skeleton::Point([0.0; 3]), 0.0, None); TOGETHER];
+        let mut looked_up = [None; TOGETHER];
         for (shapes, answers) in shapes.chunks(TOGETHER).zip(answers.chunks_mut(TOGETHER)) {
             for (shape, looked_up) in shapes.iter().zip(&mut looked_up) {
-                let (skeleton, radius) = self.stored(shape);
-                *looked_up = (skeleton, radius, near(index, &skeleton, radius));
+                *looked_up = match self.stored(shape) {
+                    Some(Stored::Skeleton(skeleton, radius)) => {
+                        Some((skeleton, radius, near(index, &skeleton, radius)))
+                    }
+                    _ => None,
+                };
             }
-            for ((skeleton, radius, near), answer) in looked_up.iter().zip(answers) {
-                *answer = self.holds(index, (skeleton, *radius), *near);
+            for ((shape, looked_up), answer) in shapes.iter().zip(&looked_up).zip(answers) {
+                *answer = match looked_up {
+                    Some((skeleton, radius, near)) => self.holds(index, (skeleton, *radius), *near),
+                    None => self.touches(shape),
+                };
             }
         }
     }
@@ -175,12 +135,12 @@ impl Placed<'_> {
             }
     }
 
-    /// Finds the point nearest to a skeleton within `reach`, the first among equals, with its
+    /// Finds the point nearest to the core of a shape within `reach`, the first among equals, with its
     /// squared distance. With `any`, returns any point within reach.
-    fn nearest_within(&self, skeleton: &Skeleton, reach: f64, any: bool) -> Option<(usize, f64)> {
+    fn nearest_within(&self, stored: &Stored<'_>, reach: f64, any: bool) -> Option<(usize, f64)> {
         /// Coordinates beyond this have squares outside the range of single precision.
         const FARTHEST: f64 = 1e15;
-        let (centre, radius) = skeleton.ball();
+        let (centre, radius) = stored.ball();
         let (middle, bounds) = (Vector3::from(centre), self.scan().root_box());
         let far = middle.amax() + f64::from(Vector3::from(bounds.centre).amax() + bounds.radius());
         // Too far away, single precision cannot tell the boxes apart: all of them are searched.
@@ -188,7 +148,7 @@ impl Placed<'_> {
         let arrays = self.scan().arrays();
         let mut search = Search {
             arrays: &arrays,
-            skeleton,
+            stored,
             any,
             // Rounding error of the distance of a box in single precision.
             beyond: radius * (1.0 + 1e-9) + 4e-6 * far,
@@ -204,33 +164,67 @@ impl Placed<'_> {
         (i != usize::MAX).then_some((i, distance_sq))
     }
 
-    /// Converts a shape to the stored frame of the scan: its skeleton and radius. The radius is
-    /// negative for a box with a negative or NaN edge.
+    /// Converts a shape to the stored frame of the scan; `None` if it is invalid.
     #[inline]
-    fn stored(&self, shape: &Shape) -> (Skeleton, f64) {
+    fn stored<'s>(&'s self, shape: &Shape<'s>) -> Option<Stored<'s>> {
         let placed = self.stored_to_world();
-        match *shape {
-            Shape::Sphere { centre, radius } => {
-                (Skeleton::Point(placed.apply_inverse(centre)), radius / placed.scale())
-            }
-            Shape::Capsule { ends, radius } => {
-                (Skeleton::Segment(ends.map(|end| placed.apply_inverse(end))), radius / placed.scale())
-            }
-            Shape::Box { pose, half } => {
+        let radius = shape.rounding() / placed.scale();
+        let skeleton = match *shape {
+            Shape::Sphere { centre, .. } => Skeleton::Point(placed.apply_inverse(centre)),
+            Shape::Capsule { ends, .. } => Skeleton::Segment(ends.map(|end| placed.apply_inverse(end))),
+            Shape::Box { pose, half, .. } => {
                 let per_scale = pose.scale() / placed.scale();
                 let axis = |k: usize| {
                     let mut axis = [0.0; 3];
                     axis[k] = 1.0;
                     placed.rotate_inverse(pose.rotate(axis))
                 };
-                let skeleton = Skeleton::Box {
+                // This comparison is false for NaN, so that a NaN edge touches nothing.
+                if !half.iter().all(|&h| h >= 0.0) {
+                    return None;
+                }
+                Skeleton::Box {
                     centre: placed.apply_inverse(pose.translation()),
                     half: half.map(|h| h * per_scale),
                     axes: [axis(0), axis(1), axis(2)],
-                };
-                // This comparison is false for NaN, so that a NaN edge touches nothing.
-                (skeleton, if half.iter().all(|&h| h >= 0.0) { 0.0 } else { -1.0 })
+                }
             }
+            _ => return Solid::new(shape, placed).map(Stored::Solid),
+        };
+        (radius >= 0.0).then_some(Stored::Skeleton(skeleton, radius))
+    }
+}
+
+/// A shape in the stored frame of a scan.
+#[derive(Clone, Copy)]
+enum Stored<'a> {
+    /// A shape that the index knows, and its radius.
+    Skeleton(Skeleton, f64),
+    Solid(Solid<'a>),
+}
+
+impl Stored<'_> {
+    fn radius(&self) -> f64 {
+        match self {
+            Self::Skeleton(_, radius) => *radius,
+            Self::Solid(solid) => solid.radius,
+        }
+    }
+
+    /// The centre and the radius of a ball about the core.
+    fn ball(&self) -> ([f64; 3], f64) {
+        match self {
+            Self::Skeleton(skeleton, _) => skeleton.ball(),
+            Self::Solid(solid) => (solid.centre.into(), solid.half.norm()),
+        }
+    }
+
+    /// The squared distance of a point from the core.
+    #[inline]
+    fn distance_sq(&self, p: [f64; 3]) -> f64 {
+        match self {
+            Self::Skeleton(skeleton, _) => skeleton.distance_sq(p),
+            Self::Solid(solid) => solid.distance(&p.into()).powi(2),
         }
     }
 }
@@ -248,7 +242,7 @@ fn near<'a>(index: &'a ShapeIndex, skeleton: &Skeleton, radius: f64) -> Option<&
 /// The search for the point nearest to a skeleton, which visits the boxes near a ball about it.
 struct Search<'a> {
     arrays: &'a ScanArrays<'a>,
-    skeleton: &'a Skeleton,
+    stored: &'a Stored<'a>,
     /// `true` if any point within reach will do.
     any: bool,
     /// The greatest difference of a relevant box's distance from the centre of the ball and its
@@ -275,7 +269,7 @@ impl PlaceVisitor for Search<'_> {
 
     fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
         for i in self.arrays.leaves.points(number) {
-            let own = (self.skeleton.distance_sq(self.arrays.position(i).map(f64::from)), i);
+            let own = (self.stored.distance_sq(self.arrays.position(i).map(f64::from)), i);
             if own < self.best {
                 self.best = own;
                 self.limit();

@@ -22,6 +22,7 @@ mod reading;
 mod scans;
 mod shapes;
 mod slices;
+mod solids;
 mod sweep;
 mod town;
 
@@ -79,6 +80,8 @@ enum Command {
     Shapes(shapes::Arguments),
     /// Slice maps: building, boxes, avatars, slices on disk
     Slices(slices::Asked),
+    /// Convex shapes and rays against the surface of a scan
+    Solids(solids::Arguments),
     /// Times of boolean queries over the distance, and near contact
     Sweep(sweep::Options),
     /// Writes a generated scan of a town, of any size
@@ -107,6 +110,7 @@ fn main() -> Result<(), Failure> {
         Command::Scans(options) => scans::run(&options),
         Command::Shapes(arguments) => shapes::run(&arguments),
         Command::Slices(asked) => slices::run(&asked),
+        Command::Solids(arguments) => solids::run(&arguments),
         Command::Sweep(options) => sweep::run(&options),
         Command::Town(options) => town::run(&options),
     }

@@ -73,7 +73,7 @@ fn measure(object: &Object, (number, passes, radius, seed): (usize, u32, f64, u6
         let Drawn { centres, spheres, capsules, boxes } = draw(object, (number, radius, seed), away);
         let singles: Vec<[f32; 3]> = centres.iter().map(|&c| single(c)).collect();
         let [reach] = [single([radius; 3])[0]];
-        let one_by_one = |shapes: &[Shape]| {
+        let one_by_one = |shapes: &[Shape<'_>]| {
             least(passes, || shapes.iter().filter(|s| placed.touches(black_box(s))).count())
         };
         let mut answers = vec![false; number];
@@ -112,9 +112,9 @@ fn measure(object: &Object, (number, passes, radius, seed): (usize, u32, f64, u6
 /// Shapes of each kind at the same positions.
 struct Drawn {
     centres: Vec<[f64; 3]>,
-    spheres: Vec<Shape>,
-    capsules: Vec<Shape>,
-    boxes: Vec<Shape>,
+    spheres: Vec<Shape<'static>>,
+    capsules: Vec<Shape<'static>>,
+    boxes: Vec<Shape<'static>>,
 }
 
 /// Draws positions at most `away` r from a point or, without `away`, in the bounding box.
@@ -131,19 +131,20 @@ fn draw(object: &Object, (number, radius, seed): (usize, f64, u64), away: Option
             }
         })
         .collect();
-    let spheres: Vec<Shape> = centres.iter().map(|&centre| Shape::Sphere { centre, radius }).collect();
-    let capsules: Vec<Shape> = centres
+    let spheres: Vec<Shape<'_>> = centres.iter().map(|&centre| Shape::Sphere { centre, radius }).collect();
+    let capsules: Vec<Shape<'_>> = centres
         .iter()
         .map(|&from| {
             let along = unit_vector(rng).map(|x| x * 4.0 * radius);
             Shape::Capsule { ends: [from, [0, 1, 2].map(|k| from[k] + along[k])], radius }
         })
         .collect();
-    let boxes: Vec<Shape> = centres
+    let boxes: Vec<Shape<'_>> = centres
         .iter()
         .map(|&centre| Shape::Box {
             pose: rotation(rng).with_translation(centre),
             half: [2.0 * radius, radius, 0.5 * radius],
+            radius: 0.0,
         })
         .collect();
     Drawn { centres, spheres, capsules, boxes }

@@ -4,6 +4,7 @@
 mod animating;
 mod bad_input;
 mod building_maps;
+mod casting;
 mod clashes;
 mod collide;
 mod converting;

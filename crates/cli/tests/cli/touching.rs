@@ -49,7 +49,18 @@ fn what_is_no_shape_is_refused_with_its_line() {
         (r#"{"sphere":{"centre":[0,0,0],"radius":-1}}"#, &["line 2", "`radius`, got -1"][..]),
         (r#"{"sphere":{"centre":[0,0],"radius":1}}"#, &["line 2", "column"]),
         (r#"{"sphere":{"centre":[0,0,0]}}"#, &["line 2", "radius"]),
-        (r#"{"cone":{}}"#, &["line 2", "unknown shape `cone`; known: sphere, capsule, box"]),
+        (r#"{"prism":{}}"#, &["line 2", "unknown shape `prism`; known: sphere, capsule, box, cylinder"]),
+        (r#"{"cone":{}}"#, &["line 2", "pose"]),
+        (r#"{"hull":{"points":[]}}"#, &["line 2", "at least one point in `points`"]),
+        (r#"{"segment":{"points":[[0,0,0],[1,0,0]],"radius":-2}}"#, &["line 2", "`radius`, got -2"]),
+        (
+            r#"{"cylinder":{"pose":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"half_height":-1,"radius":1}}"#,
+            &["line 2", "`half_height`, got -1"],
+        ),
+        (
+            r#"{"sphere":{"centre":[0,0,0],"radius":1},"box":{"pose":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1]}}"#,
+            &["line 2", "expected one shape, got 2"],
+        ),
         (
             r#"{"box":{"pose":[1,0,0,0,0,2,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1]}}"#,
             &["line 2", "pose", "rotation"],
@@ -67,4 +78,61 @@ fn what_is_no_shape_is_refused_with_its_line() {
     );
     place.refused(2, &["touch", "ball.xyz"], &["--shapes"]);
     place.refused(1, &["touch", "ball.xyz", "--shapes", "none.jsonl"], &["none.jsonl", "no such file"]);
+}
+
+/// Shapes near and in a floor at z = 0, with half their depth or twice their distance.
+const ON_FLOOR: &str = r#"
+{"sphere":{"centre":[0.51,0.52,0.19],"radius":0.2}}
+{"capsule":{"ends":[[0.3,0.5,0.09],[0.7,0.5,0.09]],"radius":0.1}}
+{"box":{"pose":[1,0,0,0.5, 0,1,0,0.5, 0,0,1,0.19, 0,0,0,1],"half":[0.3,0.2,0.2]}}
+{"box":{"pose":[1,0,0,0.5, 0,1,0,0.5, 0,0,1,0.19, 0,0,0,1],"half":[0.2,0.1,0.1],"radius":0.1}}
+{"cylinder":{"pose":[1,0,0,0.5, 0,0,-1,0.5, 0,1,0,0.19, 0,0,0,1],"half_height":0.2,"radius":0.1}}
+{"cone":{"pose":[1,0,0,0.5, 0,0,-1,0.5, 0,1,0,0.19, 0,0,0,1],"half_height":0.2,"radius":0.1}}
+{"hull":{"points":[[0.5,0.5,-0.01],[0.6,0.5,0.3],[0.5,0.7,0.3],[0.4,0.4,0.4]]}}
+{"triangle":{"points":[[0.5,0.5,-0.01],[0.6,0.5,0.3],[0.5,0.7,0.3]]}}
+{"segment":{"points":[[0.5,0.5,-0.01],[0.6,0.5,0.3]]}}
+"#;
+
+#[test]
+fn shapes_on_a_floor_have_contacts_with_the_surface() {
+    let place = Place::new();
+    place.cloud("floor.xyz", nearmiss_testdata::shapes::patch(2.0, 2.0), 0.05);
+    place.write("shapes.jsonl", ON_FLOOR);
+    let asked = ["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--surface", "--json"];
+    let told = place.ok(&asked).json();
+    assert_eq!(told.len(), 9, "{told:?}");
+    assert_eq!(keys(&told[0]), sorted("touches evidence reason lower upper contacts band micros"));
+    for line in &told {
+        assert!(line["touches"] == true && line["lower"] == 0.0 && line["upper"] == 0.0, "{line}");
+        let contacts = line["contacts"].as_array().unwrap();
+        assert_eq!(keys(&contacts[0]), sorted("point normal depth id"));
+        let depth = contacts[0]["depth"].as_f64().unwrap();
+        assert!((depth - 0.01).abs() < 1e-3 && numbers(&contacts[0]["normal"])[2] > 0.99, "{line}");
+    }
+    // Two units higher, nothing touches.
+    let lowered = shift(0.0, 0.0, -2.0);
+    let above = [&asked[..5], &["--pose", lowered.as_str(), "--json"]].concat();
+    for line in place.ok(&above).json() {
+        let (lower, upper) = (line["lower"].as_f64().unwrap(), line["upper"].as_f64().unwrap());
+        assert!(line["touches"] == false && line["evidence"] == "certified", "{line}");
+        assert!(lower > 1.9 && lower < 1.99 && (upper - 1.99).abs() < 1e-3, "{line}");
+        assert_eq!(line["contacts"].as_array().map(Vec::len), Some(0), "{line}");
+    }
+    let within = [&asked[..5], &["--pose", lowered.as_str(), "--margin", "2", "--json"]].concat();
+    for line in place.ok(&within).json() {
+        let depth = line["contacts"][0]["depth"].as_f64().unwrap();
+        assert!(line["touches"] == true && (depth + 1.99).abs() < 1e-3, "{line}");
+    }
+    let thick = ["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--thickened", "0.05", "--json"];
+    assert!(place.ok(&thick).json().iter().all(|line| line["evidence"] == "certified"), "balls are exact");
+    let people = place.ok(&asked[..5]).results;
+    assert!(people.contains("line 2: The shape touches it (certified). 0.01 deep at "), "{people}");
+    place.refused(
+        2,
+        &["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--margin", "1"],
+        &["--margin", "--surface"],
+    );
+    // Against the points alone, all shapes have an answer as well.
+    let of_points = place.ok(&["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--json"]).json();
+    assert!(of_points.iter().all(|line| line["gap"].as_f64().is_some_and(|gap| gap < 0.1)), "{of_points:?}");
 }

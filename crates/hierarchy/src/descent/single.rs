@@ -24,6 +24,14 @@ pub trait PlaceVisitor {
         f32x4::splat(simd, self.most_sq())
     }
 
+    /// Returns the squared distances of the children of `node` from the position, or lower bounds of
+    /// the squared distances from something larger. Infinite for a child that is skipped.
+    #[inline(always)]
+    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, siblings: &Siblings, place: [f32; 3]) -> f32x4<S> {
+        let _ = node;
+        siblings.distances_sq(simd, place)
+    }
+
     /// Returns `true` if a node, whose box is at this squared distance, is to be visited. Called
     /// immediately before the visit.
     #[inline(always)]
@@ -72,7 +80,7 @@ impl Tree<'_> {
                 continue;
             }
             let (siblings, children) = (&self.siblings[node.index()], topology.children(node));
-            let (bottom, distances) = (top, siblings.distances_sq(simd, place));
+            let (bottom, distances) = (top, visitor.distances_sq(simd, node, siblings, place));
             let near: mask32x4<S> = distances.simd_le(visitor.most_sq_of(simd, siblings));
             let near = near.to_bitmask() & u64::from(lanes_of(children));
             if V::IN_ORDER {

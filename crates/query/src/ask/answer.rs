@@ -72,6 +72,8 @@ pub enum Reason {
     /// have squares outside double precision. Also returned if one scan's frame is more than 2⁶⁰
     /// times as large as the other's.
     Pose,
+    /// A shape is invalid: a length of it is negative, infinite or NaN, or a point is not finite.
+    Shape,
 }
 
 /// A point where two scans meet, in the world.

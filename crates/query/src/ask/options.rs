@@ -310,6 +310,9 @@ pub enum PlanError {
     /// The option is for two scans; a mesh and a scan are compared without it.
     #[error("expected the default method and order for a mesh and a scan, got {0}; leave it out")]
     NotForMeshes(&'static str),
+    /// The option is for two scans; shapes and rays are compared with a scan without it.
+    #[error("expected the default method for shapes and rays, got {0}; leave it out")]
+    NotForShapes(&'static str),
     /// The surfaces of the two scans are defined by different metrics.
     #[error(
         "expected two scans prepared for the same kernel, got the {} and the {} kernel; prepare one of them again",

@@ -19,7 +19,7 @@ use crate::pair::placed::Placed;
 use crate::pair::placed_balls::is_proper;
 use crate::pair::prepared::Prepared;
 use crate::question::Pair;
-use crate::shape::Shape;
+use crate::solid::shape::Shape;
 
 /// The id of a placed scan or mesh in a [`World`]. Ids increase and are never reused, even after removals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -344,7 +344,7 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
 
     /// Writes the bodies whose bounding boxes come within `reach` of `shape` to `ids`, in ascending
     /// order. No other body [touches](Placed::touches) the shape.
-    pub fn near_shape(&self, shape: &Shape, reach: f64, ids: &mut Vec<BodyId>) {
+    pub fn near_shape(&self, shape: &Shape<'_>, reach: f64, ids: &mut Vec<BodyId>) {
         let bounds = shape.bounds().filter(|b| b.min.iter().chain(&b.max).all(|x| x.abs() <= FARTHEST));
         self.near_bounds(bounds, reach, ids);
     }

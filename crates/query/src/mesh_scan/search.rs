@@ -14,7 +14,7 @@ use nearmiss_mesh::{Corners, unit_normal};
 
 use crate::ask::answer::{Contact, Evidence, Reason};
 use crate::ask::options::{CollideOptions, Detail};
-use crate::mesh_scan::disc_triangle::{FlatDisc, Nearest};
+use crate::leaf::disc_triangle::{FlatDisc, Nearest};
 use crate::mesh_scan::mesh_scan_pair::MeshScanPairing;
 use crate::mesh_scan::triangle_lanes::discs_reach_box;
 use crate::mesh_scan::witness::Witness;

@@ -15,7 +15,7 @@ fn between(p: [f64; 3], q: [f64; 3]) -> f64 {
 }
 
 /// The distance of a world point from a shape.
-fn gap(shape: &Shape, p: [f64; 3]) -> f64 {
+fn gap(shape: &Shape<'_>, p: [f64; 3]) -> f64 {
     match *shape {
         Shape::Sphere { centre, radius } => between(p, centre) - radius,
         Shape::Capsule { ends: [from, to], radius } => {
@@ -32,10 +32,10 @@ fn gap(shape: &Shape, p: [f64; 3]) -> f64 {
             }
             at(0.5 * (low + high)) - radius
         }
-        Shape::Box { pose, half } => {
+        Shape::Box { pose, half, radius } => {
             let own = pose.apply_inverse(p);
             let nearest = [0, 1, 2].map(|k| own[k].clamp(-half[k], half[k]));
-            between(own, nearest) * pose.scale()
+            between(own, nearest) * pose.scale() - radius
         }
         _ => panic!("no other shapes"),
     }
@@ -72,7 +72,8 @@ fn shapes_touch_what_brute_force_says_and_the_nearest_point_is_nearest() {
                 3 => Shape::Capsule { ends: [centre; 2], radius },
                 _ => {
                     let half = [radius, 0.5 * radius, 2.0 * radius].map(|h| h / 3.0);
-                    Shape::Box { pose: rotation(&mut rng).with_scale(3.0).with_translation(centre), half }
+                    let pose = rotation(&mut rng).with_scale(3.0).with_translation(centre);
+                    Shape::Box { pose, half, radius: 0.0 }
                 }
             };
             let gaps: Vec<f64> = (0..scan.len()).map(|i| gap(&shape, view.point(i))).collect();
@@ -120,7 +121,7 @@ fn many_shapes_are_answered_as_one_by_one_on_any_number_of_threads() {
     let index = ShapeIndex::new(&scan);
     let placed = Placed::new(&scan, &Pose::from_translation([0.5, 0.0, 0.0])).with_shapes(&index);
     let mut rng = arbitrary::rng(92);
-    let shapes: Vec<Shape> =
+    let shapes: Vec<Shape<'_>> =
         (0..5000).map(|_| Shape::Sphere { centre: point_in(&mut rng, 1.5), radius: 0.1 }).collect();
     let one_by_one: Vec<bool> = shapes.iter().map(|shape| placed.touches(shape)).collect();
     for threads in [1, 2, 5] {
@@ -147,8 +148,8 @@ fn what_is_no_shape_touches_nothing_and_what_is_endless_everything() {
         sphere([f64::INFINITY, 0.0, 0.0], 1.0),
         sphere([1e200, 0.0, 0.0], 1.0),
         Shape::Capsule { ends: [[0.0; 3], [f64::NAN; 3]], radius: 1.0 },
-        Shape::Box { pose: Pose::IDENTITY, half: [1.0, -1.0, 1.0] },
-        Shape::Box { pose: Pose::IDENTITY, half: [1.0, f64::NAN, 1.0] },
+        Shape::Box { pose: Pose::IDENTITY, half: [1.0, -1.0, 1.0], radius: 0.0 },
+        Shape::Box { pose: Pose::IDENTITY, half: [1.0, f64::NAN, 1.0], radius: 0.0 },
     ] {
         assert!(!placed.touches(&shape) && !view.touches(&shape), "{shape:?}");
     }

@@ -355,7 +355,7 @@ fn bodies_left_out_for_a_shape_do_not_touch_it() {
         let shape = [
             Shape::Sphere { centre, radius: size },
             Shape::Capsule { ends: [centre, end], radius: 0.3 * size },
-            Shape::Box { pose, half: [size, 0.5 * size, 0.1 * size] },
+            Shape::Box { pose, half: [size, 0.5 * size, 0.1 * size], radius: 0.0 },
         ][round % 3];
         let reach = [0.0, size][round % 2];
         world.near_shape(&shape, reach, &mut ids);

@@ -28,11 +28,24 @@ pub(crate) struct Nearest {
 
 impl FlatDisc {
     /// The point of the disc nearest to `x`.
-    fn nearest(&self, x: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn nearest(&self, x: &Vector3<f64>) -> Vector3<f64> {
         let away = x - self.centre;
         let across = away - self.normal * self.normal.dot(&away);
         let length = across.norm();
         self.centre + if length > self.radius { across * (self.radius / length) } else { across }
+    }
+
+    /// The point of the disc furthest along `d`, relative to its centre.
+    #[inline]
+    pub(crate) fn rim(&self, d: &Vector3<f64>) -> Vector3<f64> {
+        let across = d - self.normal * self.normal.dot(d);
+        let square = across.norm_squared();
+        // Along the normal all points are equal.
+        if square > 1e-24 * d.norm_squared() {
+            across * (self.radius / square.sqrt())
+        } else {
+            Vector3::zeros()
+        }
     }
 
     /// The nearest points of the disc and a triangle. If they cross, the middle of what they have
@@ -95,7 +108,7 @@ impl FlatDisc {
     }
 
     /// The share of the edge from `p` along `way` at which it is nearest to the disc.
-    fn nearest_share(&self, p: Vector3<f64>, way: Vector3<f64>) -> f64 {
+    pub(crate) fn nearest_share(&self, p: Vector3<f64>, way: Vector3<f64>) -> f64 {
         /// Halvings to a rounding error.
         const ROUNDS: u32 = 60;
         // Derivative of half the squared distance along the edge.

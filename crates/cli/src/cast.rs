@@ -1,0 +1,160 @@
+//! `cast`: the first place where rays hit a scan.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nearmiss::{CollideOptions, Ray, RayAnswer, Scratch, ShapePlan, Target};
+use serde::{Deserialize, Serialize};
+
+use crate::answer_report::word;
+use crate::console::{Console, Results, now};
+use crate::digits::{place, rounded};
+use crate::error::CliError;
+use crate::input::{Opening, TextLines};
+use crate::posing;
+use crate::preprocess::parse_threads;
+
+/// Options of `cast`.
+#[derive(Debug, Clone, Args)]
+pub struct CastArgs {
+    /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
+    pub scan: PathBuf,
+    /// Rays in world units, one JSON object on each line; `-` reads standard input
+    ///
+    /// `{"origin":[x,y,z],"direction":[x,y,z]}`, with `"max":d` for a ray that ends after the length d,
+    /// and `"radius":r` for a ball that moves along the ray. Each ray gets one line of output, in order.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub rays: PathBuf,
+    /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose: Option<String>,
+    /// Threads to prepare a raw input; 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
+    pub threads: Option<usize>,
+    /// Check prepared scans in full before use: checksums, and every number
+    #[arg(long, help_heading = "Advanced", hide_short_help = true)]
+    pub verify: bool,
+    /// Print one JSON object for each ray
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
+    pub quiet: bool,
+}
+
+/// The JSON output of `cast`.
+#[derive(Debug, Serialize)]
+struct CastReport {
+    /// The length of the ray up to the hit.
+    t: Option<f64>,
+    point: Option<[f64; 3]>,
+    normal: Option<[f64; 3]>,
+    evidence: &'static str,
+    micros: f64,
+}
+
+pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
+    let matrix = posing::from_option("--pose", args.pose.as_deref())?;
+    let mut rays = RayFile::open(&args.rays)?;
+    let console = Console::new(args.quiet);
+    let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
+    let scan = opening.open(&args.scan)?;
+    let pose = posing::of_object(&matrix, &scan)
+        .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
+    let target = Target::new(scan.at(&pose), &plan);
+    let unit = 0.01 * scan.sampling_radius() * pose.scale();
+    let (mut scratch, mut results) = (Scratch::default(), Results::new());
+    while let Some((line, text)) = rays.next_line()? {
+        // Answers to the lines before a faulty one are written before the error.
+        let ray = rays.ray(line, &text).or_else(|fault| results.flush().and(Err(fault)))?;
+        let start = now();
+        let answer = target.cast(&ray, &mut scratch);
+        #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+        let micros = start.elapsed().as_nanos() as f64 / 1e3;
+        let RayAnswer { hit, evidence } = answer;
+        if args.json {
+            results.json(&CastReport {
+                t: hit.map(|hit| hit.t),
+                point: hit.map(|hit| hit.point),
+                normal: hit.map(|hit| hit.normal),
+                evidence: word(evidence),
+                micros,
+            })?;
+        } else {
+            results.line(format_args!("line {line}: {}", sentence(&answer, unit)))?;
+        }
+    }
+    results.flush()
+}
+
+/// Returns the answer as a sentence. Places are rounded to `unit`.
+fn sentence(answer: &RayAnswer, unit: f64) -> String {
+    let evidence = word(answer.evidence);
+    match answer.hit {
+        Some(hit) => {
+            let (at, t) = (place(hit.point, unit), rounded(hit.t, unit));
+            format!("It hits {at} after {t} ({evidence}), at point {}.", hit.source.0)
+        }
+        None => format!("It hits nothing ({evidence})."),
+    }
+}
+
+/// The form of a line, for messages.
+const RAY_LINE: &str =
+    r#"a line is {"origin":[x,y,z],"direction":[x,y,z]}, with "max":d and "radius":r if wanted"#;
+
+/// A line of a file of rays. Other fields are ignored.
+#[derive(Debug, Deserialize)]
+#[serde(expecting = "an object")]
+struct RayLine {
+    origin: [f64; 3],
+    direction: [f64; 3],
+    max: Option<f64>,
+    #[serde(default)]
+    radius: f64,
+}
+
+/// A file with a ray on each line.
+struct RayFile {
+    lines: TextLines,
+    /// `true` until a line with a ray has been read.
+    is_empty: bool,
+}
+
+impl RayFile {
+    fn open(path: &Path) -> Result<Self, CliError> {
+        Ok(Self { lines: TextLines::open(path)?, is_empty: true })
+    }
+
+    /// Returns the number of the next line that is not blank, counted from 1, and its text.
+    fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
+        let line = self.lines.next_filled()?;
+        if line.is_none() && self.is_empty {
+            return Err(self.lines.unsuitable(format!("expected rays, got none; {RAY_LINE}")));
+        }
+        self.is_empty = false;
+        Ok(line)
+    }
+
+    /// Parses the ray on line `number`, whose text is `text`.
+    fn ray(&self, number: u64, text: &str) -> Result<Ray, CliError> {
+        let line: RayLine = serde_json::from_str(text).map_err(|e| {
+            let message = e.to_string();
+            let what = message.split(" at line ").next().unwrap_or_default();
+            self.lines.fault_on(number, format!("column {}: {what}; {RAY_LINE}", e.column()))
+        })?;
+        let RayLine { origin, direction, max, radius } = line;
+        let fault = |what: &str| Err(self.lines.fault_on(number, what));
+        if direction == [0.0; 3] {
+            return fault("expected a direction with a length above zero in `direction`, got [0, 0, 0]");
+        }
+        if max.is_some_and(|max| max < 0.0) {
+            return fault("expected a length of zero or more in `max`, got a negative one");
+        }
+        if radius < 0.0 {
+            return fault("expected a length of zero or more in `radius`, got a negative one");
+        }
+        Ok(Ray::new(origin, direction).with_max(max.unwrap_or(f64::INFINITY)).with_radius(radius))
+    }
+}

@@ -1,0 +1,54 @@
+//! The options of `touch`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::parse::parse_radius;
+use crate::preprocess::parse_threads;
+
+/// Options of `touch`.
+#[derive(Debug, Clone, Args)]
+pub struct TouchArgs {
+    /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
+    pub scan: PathBuf,
+    /// Shapes in world units, one JSON object on each line; `-` reads standard input
+    ///
+    /// `{"sphere":{"centre":[x,y,z],"radius":r}}`,
+    /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}`, `{"box":{"pose":[16
+    /// numbers],"half":[x,y,z]}}`, `{"cylinder":{"pose":[…],"half_height":h,"radius":r}}` about the y
+    /// axis of its pose, `{"cone":{…}}` alike with its tip at the top,
+    /// `{"hull":{"points":[[x,y,z],…]}}`, `{"triangle":{"points":[…]}}` or
+    /// `{"segment":{"points":[…]}}`. A `radius` also rounds boxes, hulls, triangles and segments;
+    /// `rounding` rounds cylinders and cones. Each shape gets one line of output, in order.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub shapes: PathBuf,
+    /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose: Option<String>,
+    /// Test the surface between the points, and report bounds of the distance and contacts
+    ///
+    /// The surface is the obstacle: tangent discs where points sample a sheet, balls of half the
+    /// local spacing about all other points. Normals of contacts point outwards if the scan is
+    /// oriented (`preprocess --graph`), otherwise to the side of the shape's centre.
+    #[arg(long)]
+    pub surface: bool,
+    /// Test balls of this radius about the points instead, with the same report
+    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = parse_radius)]
+    pub thickened: Option<f64>,
+    /// Shapes within this distance of the surface touch it; needs --surface or --thickened
+    #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius)]
+    pub margin: Option<f64>,
+    /// Threads to prepare a raw input; 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
+    pub threads: Option<usize>,
+    /// Check prepared scans in full before use: checksums, and every number
+    #[arg(long, help_heading = "Advanced", hide_short_help = true)]
+    pub verify: bool,
+    /// Print one JSON object for each shape
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
+    pub quiet: bool,
+}

@@ -1,0 +1,250 @@
+//! Files with a shape on each line.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nearmiss::{Aabb, Pose, PoseError, Shape};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use crate::digits::short;
+use crate::error::CliError;
+use crate::input::TextLines;
+use crate::matrix::PoseRefused;
+
+/// The form of a line, for messages.
+const SHAPE_LINE: &str = r#"a line is {"sphere":{"centre":[x,y,z],"radius":r}}, {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}, {"box":{"pose":[16 numbers],"half":[x,y,z]}}, {"cylinder":{"pose":[16 numbers],"half_height":h,"radius":r}}, {"cone":{"pose":[16 numbers],"half_height":h,"radius":r}}, {"hull":{"points":[[x,y,z],…]}}, {"triangle":{"points":[[x,y,z],[x,y,z],[x,y,z]]}} or {"segment":{"points":[[x,y,z],[x,y,z]]}}"#;
+
+/// The names of the shapes.
+const SHAPES: [&str; 8] = ["sphere", "capsule", "box", "cylinder", "cone", "hull", "triangle", "segment"];
+
+/// A line of a file of shapes, which holds one shape. Other fields are ignored.
+#[derive(Debug, Deserialize)]
+#[serde(expecting = "an object")]
+struct ShapeLine {
+    sphere: Option<SphereLine>,
+    capsule: Option<CapsuleLine>,
+    r#box: Option<BoxLine>,
+    cylinder: Option<RoundLine>,
+    cone: Option<RoundLine>,
+    hull: Option<HullLine>,
+    triangle: Option<TriangleLine>,
+    segment: Option<SegmentLine>,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
+}
+
+#[derive(Debug, Deserialize)]
+struct SphereLine {
+    #[serde(alias = "center")]
+    centre: [f64; 3],
+    radius: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct CapsuleLine {
+    ends: [[f64; 3]; 2],
+    radius: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct BoxLine {
+    pose: [f64; 16],
+    half: [f64; 3],
+    #[serde(default)]
+    radius: f64,
+}
+
+/// A cylinder or a cone.
+#[derive(Debug, Deserialize)]
+struct RoundLine {
+    pose: [f64; 16],
+    half_height: f64,
+    radius: f64,
+    #[serde(default)]
+    rounding: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct HullLine {
+    points: Vec<[f64; 3]>,
+    #[serde(default)]
+    radius: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct TriangleLine {
+    points: [[f64; 3]; 3],
+    #[serde(default)]
+    radius: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct SegmentLine {
+    points: [[f64; 3]; 2],
+    #[serde(default)]
+    radius: f64,
+}
+
+/// A shape from a file.
+#[derive(Debug)]
+pub(super) enum ReadShape {
+    Plain(Shape<'static>),
+    /// The convex hull of points, and the radius about it.
+    Hull(Vec<[f64; 3]>, f64),
+}
+
+impl ReadShape {
+    pub(super) fn shape(&self) -> Shape<'_> {
+        match self {
+            Self::Plain(shape) => *shape,
+            Self::Hull(points, radius) => Shape::Hull { points, radius: *radius },
+        }
+    }
+}
+
+impl ShapeLine {
+    /// Returns the shape of the line. The pose of a solid may deviate from a rotation by a tenth of `r`.
+    fn read(self, r: f64) -> Result<ReadShape, String> {
+        let mut shapes: Vec<Result<ReadShape, String>> = Vec::new();
+        let mut add = |shape: Option<Result<ReadShape, String>>| shapes.extend(shape);
+        add(self.sphere.map(SphereLine::read));
+        add(self.capsule.map(CapsuleLine::read));
+        add(self.r#box.map(|line| line.read(r)));
+        add(self.cylinder.map(|line| line.read(false, r)));
+        add(self.cone.map(|line| line.read(true, r)));
+        add(self.hull.map(HullLine::read));
+        add(self.triangle.map(TriangleLine::read));
+        add(self.segment.map(SegmentLine::read));
+        match (shapes.pop(), shapes.len(), self.others.keys().next()) {
+            (Some(shape), 0, _) => shape,
+            (None, _, Some(name)) => {
+                let name: String = name.chars().take(40).flat_map(char::escape_debug).collect();
+                Err(format!("unknown shape `{name}`; known: {}", SHAPES.join(", ")))
+            }
+            (last, count, _) => {
+                let count = count + usize::from(last.is_some());
+                Err(format!("expected one shape, got {count}; {SHAPE_LINE}"))
+            }
+        }
+    }
+}
+
+impl SphereLine {
+    fn read(self) -> Result<ReadShape, String> {
+        let radius = positive("radius", self.radius)?;
+        Ok(ReadShape::Plain(Shape::Sphere { centre: self.centre, radius }))
+    }
+}
+
+impl CapsuleLine {
+    fn read(self) -> Result<ReadShape, String> {
+        let radius = positive("radius", self.radius)?;
+        Ok(ReadShape::Plain(Shape::Capsule { ends: self.ends, radius }))
+    }
+}
+
+impl BoxLine {
+    fn read(self, r: f64) -> Result<ReadShape, String> {
+        let [x, y, z] = self.half;
+        let half = [positive("half", x)?, positive("half", y)?, positive("half", z)?];
+        let radius = positive("radius", self.radius)?;
+        Ok(ReadShape::Plain(Shape::Box { pose: pose(&self.pose, half, r)?, half, radius }))
+    }
+}
+
+impl RoundLine {
+    fn read(self, is_cone: bool, r: f64) -> Result<ReadShape, String> {
+        let half_height = positive("half_height", self.half_height)?;
+        let radius = positive("radius", self.radius)?;
+        let rounding = positive("rounding", self.rounding)?;
+        let pose = pose(&self.pose, [radius, half_height, radius], r)?;
+        Ok(ReadShape::Plain(if is_cone {
+            Shape::Cone { pose, half_height, radius, rounding }
+        } else {
+            Shape::Cylinder { pose, half_height, radius, rounding }
+        }))
+    }
+}
+
+impl HullLine {
+    fn read(self) -> Result<ReadShape, String> {
+        if self.points.is_empty() {
+            return Err("expected at least one point in `points`, got none".to_owned());
+        }
+        Ok(ReadShape::Hull(self.points, positive("radius", self.radius)?))
+    }
+}
+
+impl TriangleLine {
+    fn read(self) -> Result<ReadShape, String> {
+        let radius = positive("radius", self.radius)?;
+        Ok(ReadShape::Plain(Shape::Triangle { points: self.points, radius }))
+    }
+}
+
+impl SegmentLine {
+    fn read(self) -> Result<ReadShape, String> {
+        let radius = positive("radius", self.radius)?;
+        Ok(ReadShape::Plain(Shape::Capsule { ends: self.points, radius }))
+    }
+}
+
+/// Makes a pose of a matrix. `half` are half the edge lengths of what it places.
+fn pose(matrix: &[f64; 16], half: [f64; 3], r: f64) -> Result<Pose, String> {
+    let bounds = Aabb { min: half.map(|h| -h), max: half };
+    Pose::from_row_major(matrix, &bounds, 0.1 * r).map_err(|cause| format!("`pose`: {}", refused(cause)))
+}
+
+fn refused(cause: PoseError) -> PoseRefused {
+    PoseRefused { cause, is_transposed: false, allowed: "a tenth of the sampling radius" }
+}
+
+fn positive(name: &str, length: f64) -> Result<f64, String> {
+    if length >= 0.0 {
+        Ok(length)
+    } else {
+        Err(format!("expected a length of zero or more in `{name}`, got {}", short(length)))
+    }
+}
+
+/// A file with a shape on each line.
+pub(super) struct ShapeFile {
+    lines: TextLines,
+    /// `true` until a line with a shape has been read.
+    is_empty: bool,
+}
+
+impl ShapeFile {
+    pub(super) fn open(path: &Path) -> Result<Self, CliError> {
+        Ok(Self { lines: TextLines::open(path)?, is_empty: true })
+    }
+
+    /// Returns the number of the next line that is not blank, counted from 1, and its text.
+    pub(super) fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
+        let line = self.lines.next_filled()?;
+        if line.is_none() && self.is_empty {
+            return Err(self.lines.unsuitable(format!("expected shapes, got none; {SHAPE_LINE}")));
+        }
+        self.is_empty = false;
+        Ok(line)
+    }
+
+    /// Parses the shape on line `number`, whose text is `text`. The pose of a solid may deviate from a
+    /// rotation by a tenth of `r`.
+    pub(super) fn shape(&self, number: u64, text: &str, r: f64) -> Result<ReadShape, CliError> {
+        let line: ShapeLine = serde_json::from_str(text).map_err(|e| {
+            let message = e.to_string();
+            let what = message.split(" at line ").next().unwrap_or_default();
+            self.lines.fault_on(number, format!("column {}: {what}; {SHAPE_LINE}", e.column()))
+        })?;
+        line.read(r).map_err(|what| self.lines.fault_on(number, what))
+    }
+
+    /// The error about a shape at a distance that is not finite.
+    pub(super) fn too_far(&self, number: u64) -> CliError {
+        let what =
+            "expected a shape within measurable distance, got one too far away or too large; check its units";
+        self.lines.fault_on(number, what)
+    }
+}

@@ -1,0 +1,138 @@
+//! Shapes against the surface of a scan.
+
+use nearmiss::{
+    CollideOptions, Placed, Reason, Scratch, Semantics, Shape, ShapeContact, ShapePlan, ShapeVerdict, Target,
+};
+use serde::Serialize;
+
+use crate::answer_report::word;
+use crate::console::{Results, now};
+use crate::digits::{place, rough, rounded_down, short};
+use crate::error::CliError;
+use crate::touch::args::TouchArgs;
+use crate::touch::shapes::ShapeFile;
+
+/// The question about each shape.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    semantics: Semantics,
+    margin: f64,
+}
+
+impl Asked {
+    /// Returns `None` if points alone count.
+    pub(super) fn new(args: &TouchArgs) -> Result<Option<Self>, CliError> {
+        let semantics = match args.thickened {
+            Some(radius) => Semantics::Thickened(radius),
+            None if args.surface => Semantics::Obstacle,
+            None if args.margin.is_some() => {
+                let what = "--margin: expected --surface or --thickened beside it, got neither; points alone are \
+                            compared without a margin, and `gap` tells how far they are";
+                return Err(CliError::Usage(what.to_owned()));
+            }
+            None => return Ok(None),
+        };
+        Ok(Some(Self { semantics, margin: args.margin.unwrap_or(0.0) }))
+    }
+}
+
+/// The JSON output of `touch --surface`.
+#[derive(Debug, Serialize)]
+struct SurfaceReport<'a> {
+    touches: Option<bool>,
+    evidence: Option<&'static str>,
+    reason: Option<&'static str>,
+    lower: Option<f64>,
+    upper: Option<f64>,
+    contacts: &'a [ShapeContact],
+    /// The local spacing, below which the scan does not tell; null for invalid shapes.
+    band: f64,
+    micros: f64,
+}
+
+/// Tests shapes against the surface of a scan.
+pub(super) fn of_surface(
+    placed: &Placed<'_>,
+    asked: Asked,
+    shapes: &mut ShapeFile,
+    (r, is_json): (f64, bool),
+) -> Result<(), CliError> {
+    let options = CollideOptions::default().with_semantics(asked.semantics).with_margin(asked.margin);
+    let plan = ShapePlan::new(&options, placed.scan())?;
+    let target = Target::new(*placed, &plan);
+    let (mut scratch, mut contacts, mut results) = (Scratch::default(), Vec::new(), Results::new());
+    while let Some((line, text)) = shapes.next_line()? {
+        let read = shapes.shape(line, &text, r);
+        let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
+        let report = answer(&target, &shape.shape(), &mut contacts, &mut scratch);
+        let Some(report) = report else {
+            return results.flush().and(Err(shapes.too_far(line)));
+        };
+        if is_json {
+            results.json(&report)?;
+        } else {
+            results.line(format_args!("line {line}: {}", sentence(&report, asked.margin, 0.01 * r)))?;
+        }
+    }
+    results.flush()
+}
+
+/// Answers all questions about a shape. `None` if it is invalid.
+fn answer<'c>(
+    target: &Target<'_>,
+    shape: &Shape<'_>,
+    contacts: &'c mut Vec<ShapeContact>,
+    scratch: &mut Scratch,
+) -> Option<SurfaceReport<'c>> {
+    let start = now();
+    let answer = target.touch(shape, scratch);
+    let distance = target.distance(shape, f64::INFINITY, scratch);
+    target.contacts(shape, contacts, scratch);
+    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    let (touches, evidence, reason) = match answer.verdict {
+        ShapeVerdict::Touching { evidence, .. } => (Some(true), Some(evidence), None),
+        ShapeVerdict::Separated { evidence } => (Some(false), Some(evidence), None),
+        ShapeVerdict::Undecided(Reason::Undersampled) => (None, None, Some("undersampled")),
+        ShapeVerdict::Undecided(_) => return None,
+    };
+    Some(SurfaceReport {
+        touches,
+        evidence: evidence.map(word),
+        reason,
+        lower: distance.map(|it| it.lower),
+        upper: distance.map(|it| it.upper),
+        contacts,
+        band: answer.band,
+        micros,
+    })
+}
+
+/// Returns the answer as a sentence. Places are rounded to `unit`.
+fn sentence(report: &SurfaceReport<'_>, margin: f64, unit: f64) -> String {
+    let evidence = report.evidence.unwrap_or_default();
+    match report.touches {
+        Some(true) => {
+            let within =
+                if margin > 0.0 { format!("is within {} of it", short(margin)) } else { "touches it".into() };
+            let deepest = report.contacts.first().map_or_else(String::new, |contact| {
+                let [u, v, w] = contact.normal;
+                let what = if contact.depth >= 0.0 { "deep" } else { "away" };
+                let (at, depth) = (place(contact.point, unit), rough(contact.depth.abs()));
+                format!(" {depth} {what} at {at}; the way out is ({u:.4}, {v:.4}, {w:.4}).")
+            });
+            format!("The shape {within} ({evidence}).{deepest}")
+        }
+        Some(false) => {
+            let apart = match (report.lower, report.upper) {
+                (Some(lower), Some(upper)) if lower > 0.0 => {
+                    format!("{} to {} apart", rounded_down(lower, unit), short(upper))
+                }
+                (_, Some(upper)) => format!("at most {} apart", short(upper)),
+                _ => "nothing is near".to_owned(),
+            };
+            format!("No contact ({evidence}); {apart}.")
+        }
+        None => "Cannot tell: the points near it are too sparse.".to_owned(),
+    }
+}

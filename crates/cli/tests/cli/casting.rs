@@ -1,0 +1,70 @@
+//! `cast`.
+
+use nearmiss_testdata::shapes::sphere;
+
+use crate::running::{Place, keys, numbers, shift, sorted};
+
+/// Rays from inside and outside a ball of radius 1 at (3, 0, 0) in the world.
+const RAYS: &str = r#"
+{"origin":[3,0,0],"direction":[0,0,2],"name":"from inside"}
+{"origin":[0,0,0],"direction":[1,0,0]}
+
+{"origin":[0,0,0],"direction":[1,0,0],"max":1.5}
+{"origin":[0,0,0],"direction":[1,0,0],"radius":0.25}
+{"origin":[0,2,0],"direction":[1,0,0]}
+"#;
+
+#[test]
+fn rays_hit_a_ball_where_it_is() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    place.write("rays.jsonl", RAYS);
+    let pose = shift(3.0, 0.0, 0.0);
+    let asked = ["cast", "ball.xyz", "--rays", "rays.jsonl", "--pose", &pose, "--json"];
+    let told = place.ok(&asked).json();
+    assert_eq!(keys(&told[0]), sorted("t point normal evidence micros"));
+    for (line, expected) in told.iter().zip([Some(1.0), Some(2.0), None, Some(1.75), None]) {
+        let t = line["t"].as_f64();
+        assert_eq!(t.is_some(), expected.is_some(), "{line} for {expected:?}");
+        let Some((t, expected)) = t.zip(expected) else {
+            assert!(
+                line["point"].is_null() && line["normal"].is_null() && line["evidence"] == "certified",
+                "{line}"
+            );
+            continue;
+        };
+        assert!((t - expected).abs() < 0.01, "{line} for {expected}");
+        let p = numbers(&line["point"]);
+        let off = ((p[0] - 3.0).powi(2) + p[1] * p[1] + p[2] * p[2]).sqrt();
+        assert!((off - 1.0).abs() < 0.005 && line["evidence"] == "certified", "{line}");
+    }
+    assert!(numbers(&told[0]["normal"])[2] < -0.99, "towards the origin: {}", told[0]);
+    let people = place.ok(&asked[..6]).results;
+    let lines: Vec<&str> = people.lines().collect();
+    assert!(
+        lines[0].starts_with("line 2: It hits (3.0") && lines[0].contains("(certified), at point "),
+        "{people}"
+    );
+    assert_eq!(lines[2], "line 5: It hits nothing (certified).", "{people}");
+}
+
+#[test]
+fn what_is_no_ray_is_refused_with_its_line() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.2);
+    let good = r#"{"origin":[3,0,2],"direction":[0,0,1]}"#;
+    for (line, words) in [
+        (r#"{"origin":[0,0,0],"direction":[0,0,0]}"#, &["line 2", "`direction`"][..]),
+        (r#"{"origin":[0,0],"direction":[0,0,1]}"#, &["line 2", "column"]),
+        (r#"{"origin":[0,0,0]}"#, &["line 2", "direction"]),
+        (r#"{"origin":[0,0,0],"direction":[0,0,1],"max":-1}"#, &["line 2", "`max`"]),
+        (r#"{"origin":[0,0,0],"direction":[0,0,1],"radius":-1}"#, &["line 2", "`radius`"]),
+        ("ray", &["line 2", "column 1"]),
+    ] {
+        place.write("rays.jsonl", format!("{good}\n{line}\n"));
+        place.refused(1, &["cast", "ball.xyz", "--rays", "rays.jsonl"], words);
+    }
+    place.write("rays.jsonl", "\n");
+    place.refused(1, &["cast", "ball.xyz", "--rays", "rays.jsonl"], &["expected rays, got none", "origin"]);
+    place.refused(2, &["cast", "ball.xyz"], &["--rays"]);
+}

@@ -1,0 +1,18 @@
+//! Convex shapes and rays against the obstacle of a scan.
+
+pub(crate) mod answer;
+pub(crate) mod cast;
+pub(crate) mod closest;
+pub(crate) mod contacts;
+pub(crate) mod core;
+pub(crate) mod descent;
+pub(crate) mod distance;
+pub(crate) mod elements;
+pub(crate) mod hint;
+pub(crate) mod lanes;
+pub(crate) mod meeting;
+pub(crate) mod plan;
+pub(crate) mod ray;
+pub(crate) mod scratch;
+pub(crate) mod shape;
+pub(crate) mod touch;

@@ -1,0 +1,467 @@
+//! Rays against the discs and balls of a scan, nearest node first.
+//!
+//! A ray that crosses a sheet crosses several of its discs. The one whose centre is nearest to the
+//! crossing, in disc radii, tells where. Between discs that leave a hole, the surface continues in the
+//! cells of points (docs/theory/obstacle.md): a crossing of a cell's plane counts if its point is the
+//! nearest one, or if the implicit function vanishes there.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, f32x4, f32x16, mask32x4, mask32x16};
+use nearmiss_geometry::NodeId;
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{PlaceVisitor, PointKind, SLAB, Siblings};
+use nearmiss_lanes::wide::{Bits, along, bits, product, squared};
+use nearmiss_surface::Status;
+
+use crate::ask::answer::Evidence;
+use crate::ask::options::{Detail, Semantics};
+use crate::leaf::disc_triangle::FlatDisc;
+use crate::pair::placed::ViewScratch;
+use crate::solid::elements::{Element, Elements};
+use crate::solid::ray::{RayHit, StoredRay};
+
+type Vector = Vector3<f64>;
+
+const WIDTH: usize = 16;
+
+/// Rounding of places, relative to all coordinates.
+const ROUNDING: f64 = 8e-6;
+
+/// The greatest |f| on the surface, in bandwidths.
+const ON_SURFACE: f64 = 1e-6;
+
+/// Evaluations along a ray.
+const ROUNDS: u32 = 8;
+
+/// The least cosine of a ray and a normal at which the crossing is refined.
+const GRAZING: f64 = 0.02;
+
+/// A place where a ray meets the part of a point, in the stored frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Crossing {
+    t: f64,
+    i: usize,
+    /// The distance from the centre of the disc, in disc radii; at most 1 on the disc.
+    beside: f64,
+    /// How much the ray turns the distance from the plane into its own length; 1 for balls.
+    cosine: f64,
+}
+
+impl Crossing {
+    /// Returns `true` if the ray meets the disc or ball itself.
+    pub(crate) fn is_sure(&self) -> bool {
+        self.beside <= 1.0
+    }
+
+    /// The length of the ray in which it may meet other discs of the same sheet: through half the
+    /// thickness of the sheet, and no more than a local radius.
+    fn layer(&self, elements: &Elements<'_>) -> f64 {
+        let radius = f64::from(elements.arrays.radii[self.i]);
+        radius * (f64::from(SLAB) / self.cosine).min(1.0)
+    }
+}
+
+/// The places that a search wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    First,
+    Any,
+    All,
+}
+
+struct Cast<'s, 'a> {
+    elements: &'s Elements<'a>,
+    ray: StoredRay,
+    wanted: Wanted,
+    /// The start in single precision: where the ray comes near the scan.
+    from: [f32; 3],
+    along: [f32; 3],
+    /// The distance of that place from the origin.
+    skipped: f64,
+    /// The radius and the rounding error.
+    thick: f32,
+    /// The distance from `from` beyond which nothing is of interest.
+    most: f32,
+    most_sq: f32,
+    found: &'s mut Vec<Crossing>,
+    /// `true` if the ray passes through a volume that may contain the obstacle.
+    is_doubtful: bool,
+}
+
+/// Writes the crossings of a ray with the parts of all points to `found`, up to some beyond the first
+/// if only that is wanted. Returns the evidence for there being no others.
+pub(crate) fn crossings(
+    elements: &Elements<'_>,
+    ray: &StoredRay,
+    wanted: Wanted,
+    (level, found): (Level, &mut Vec<Crossing>),
+) -> Evidence {
+    found.clear();
+    let bounds = elements.arrays.tree.root_box();
+    let centre = Vector::from(bounds.centre.map(f64::from));
+    // Boxes contain discs and balls; the obstacle exceeds them by at most a local radius.
+    let size = f64::from(bounds.radius() + bounds.reach) + elements.beyond_boxes() + ray.radius;
+    let middle = (centre - ray.origin).dot(&ray.direction);
+    let off = (centre - ray.at(middle)).norm();
+    if off.is_nan() || off > size * 1.001 || middle + size < 0.0 || middle - size * 1.001 > ray.max {
+        return elements.of_separation(false);
+    }
+    let skipped = (middle - 1.01 * size).max(0.0);
+    #[expect(clippy::cast_possible_truncation, reason = "counted in `thick`")]
+    let (single, slack) =
+        (|v: Vector| [v.x as f32, v.y as f32, v.z as f32], (ROUNDING * (elements.far + 2.0 * size)) as f32);
+    #[expect(clippy::cast_possible_truncation, reason = "counted in `thick`")]
+    let thick = (ray.radius + elements.beyond_boxes()) as f32 + slack;
+    let mut search = Cast {
+        elements,
+        ray: *ray,
+        wanted,
+        from: single(ray.at(skipped)),
+        along: single(ray.direction),
+        skipped,
+        thick,
+        most: f32::INFINITY,
+        most_sq: f32::INFINITY,
+        found,
+        is_doubtful: false,
+    };
+    search.limit(ray.max);
+    let from = search.from;
+    // Ends early if any hit will do.
+    let _ended = elements.arrays.tree.descend_to(level, from, &mut search);
+    let evidence = elements.of_separation(search.is_doubtful);
+    found.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.i.cmp(&b.i)));
+    evidence
+}
+
+/// Returns the first of the crossings from number `next` on that counts, as a hit, and the thickness of
+/// the sheet there in the world; sets `next` to the crossing after those of the same sheet.
+pub(crate) fn next_hit(
+    elements: &Elements<'_>,
+    ray: &StoredRay,
+    found: &[Crossing],
+    next: &mut usize,
+    scratch: &mut ViewScratch,
+) -> Option<(RayHit, f64)> {
+    let all = found;
+    while let Some(first) = all.get(*next) {
+        let start = *next;
+        if !elements.is_disc(first.i) {
+            *next += 1;
+            return hit(elements, ray, first, scratch).map(|hit| (hit, 0.0));
+        }
+        let layer = first.layer(elements);
+        let is_same = |it: &&Crossing| it.t - first.t <= layer;
+        let count = all[start..].iter().take_while(is_same).count();
+        *next += count;
+        let sheet = || all[start..start + count].iter().filter(|it| elements.is_disc(it.i));
+        let Some(best) = sheet().min_by(|a, b| a.beside.total_cmp(&b.beside)) else { continue };
+        let found = hit(elements, ray, best, scratch);
+        // In a hole, the point nearest to the ray may be another one.
+        let found = found.or_else(|| sheet().find_map(|it| hit(elements, ray, it, scratch)));
+        if let Some(found) = found {
+            return Some((found, layer * elements.scale()));
+        }
+        // A ball among the crossings of a hole still counts.
+        let is_ball = |it: &Crossing| !elements.is_disc(it.i);
+        *next = start + all[start..start + count].iter().position(is_ball).unwrap_or(count);
+    }
+    None
+}
+
+/// The hit at a crossing. `None` if it is in a hole between discs where there is no surface.
+fn hit(
+    elements: &Elements<'_>,
+    ray: &StoredRay,
+    crossing: &Crossing,
+    scratch: &mut ViewScratch,
+) -> Option<RayHit> {
+    let Crossing { i, t, beside, .. } = *crossing;
+    let (placed, scale) = (&elements.placed, elements.scale());
+    let source = placed.scan().id(i);
+    let x = ray.at(t);
+    let told = |t: f64, point: Vector, normal: Vector, evidence| RayHit {
+        t: t * scale,
+        point: elements.in_world(&point),
+        normal: elements.turned(&normal),
+        source,
+        evidence,
+    };
+    let disc = match elements.element(i) {
+        Element::Ball(centre, radius) => {
+            let normal = (x - centre).try_normalize(0.0).unwrap_or(-ray.direction);
+            return Some(told(t, centre + normal * radius, normal, Evidence::Certified));
+        }
+        Element::Disc(disc) => disc,
+    };
+    let towards = disc.normal * 1.0_f64.copysign(-disc.normal.dot(&ray.direction));
+    let side = |normal: Vector| {
+        if placed.scan().is_oriented() && normal.dot(&disc.normal) < 0.0 { -normal } else { normal }
+    };
+    let is_wanted = elements.plan.options().detail == Detail::Witness && placed.verifies();
+    if is_wanted
+        && let Some((t, point, normal, evidence)) = refined(elements, ray, (i, t, towards), scratch)
+        && (beside <= 1.0 || evidence == Evidence::Certified)
+    {
+        return Some(told(t, point, side(normal), evidence));
+    }
+    let on_disc = disc.nearest(&x);
+    if beside <= 1.0 {
+        let is_edge = placed.scan().kind(i) == PointKind::Edge;
+        let way = x - on_disc;
+        let rim = is_edge && beside >= 1.0 - 1e-9 && ray.radius > 0.0;
+        let normal = if rim { way.try_normalize(0.0).unwrap_or(towards) } else { side(towards) };
+        return Some(told(t, on_disc, normal, Evidence::Estimated));
+    }
+    // The surface between the discs, to first order.
+    let place = x - disc.normal * disc.normal.dot(&(x - disc.centre));
+    let is_inner = placed.scan().kind(i) == PointKind::Sheet;
+    let is_part = is_inner && placed.scan().nearest_point_near(i, place.into()) as usize == i;
+    is_part.then(|| told(t, place, side(towards), Evidence::Estimated))
+}
+
+/// Looks for the place along a ray, near distance `t`, where it is its radius away from the surface
+/// near point `i`, on the side of `towards`. Returns the distance, the point of the surface, the
+/// normal, turned to that side, and the evidence: estimated if the place is not part of the obstacle.
+fn refined(
+    elements: &Elements<'_>,
+    ray: &StoredRay,
+    (i, start, towards): (usize, f64, Vector),
+    scratch: &mut ViewScratch,
+) -> Option<(f64, Vector, Vector, Evidence)> {
+    let (placed, scale) = (&elements.placed, elements.scale());
+    let frame = placed.stored_to_world();
+    let most = f64::from(elements.arrays.radii[i]);
+    let mut field = placed.near(i, scratch);
+    let mut t = start;
+    for _ in 0..ROUNDS {
+        let x = ray.at(t);
+        // A thick ray looks at the surface beside its ball.
+        let foot = x - towards * ray.radius;
+        let at = field.evaluate(elements.in_world(&foot));
+        if at.status == Status::Outside {
+            return None;
+        }
+        let normal = Vector::from(frame.rotate_inverse(at.normal));
+        let cosine = normal.dot(&ray.direction);
+        let f = at.f / scale;
+        if f.abs() <= ON_SURFACE * at.bandwidth / scale {
+            let is_part =
+                elements.semantics == Semantics::Surface || placed.is_obstacle(i, elements.in_world(&foot));
+            let normal = normal * 1.0_f64.copysign(normal.dot(&towards));
+            let evidence =
+                if at.status == Status::Ok && is_part { Evidence::Certified } else { Evidence::Estimated };
+            return (t >= 0.0 && t <= ray.max).then_some((t, foot, normal, evidence));
+        }
+        if cosine.abs() < GRAZING {
+            return None;
+        }
+        // f is positive below the surface.
+        t += f / cosine;
+        let moved = (t - start).abs();
+        if moved.is_nan() || moved > most / cosine.abs() {
+            return None;
+        }
+    }
+    None
+}
+
+impl Cast<'_, '_> {
+    /// Ends the search at this distance from the origin.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+    fn limit(&mut self, t: f64) {
+        self.most = (((t - self.skipped) * (1.0 + 1e-6)) as f32).next_up() + self.thick;
+        self.most = self.most.max(0.0);
+        // Finite, as nodes beside the ray are infinitely far.
+        self.most_sq = (self.most * self.most).next_up().min(f32::MAX);
+    }
+
+    /// The lanes of the points of a block that the ray passes within their reach.
+    #[inline(always)]
+    fn near<S: Simd>(&self, simd: S, first: usize, count: usize) -> u32 {
+        let (mut positions, mut reaches) = ([[0.0; WIDTH]; 3], [0.0; WIDTH]);
+        for (lane, i) in (first..first + count).enumerate() {
+            let p = self.elements.arrays.position(i);
+            for k in 0..3 {
+                positions[k][lane] = p[k];
+            }
+            reaches[lane] = self.elements.ray_reach(i);
+        }
+        let [x, y, z] = &positions;
+        let [fx, fy, fz] = self.from;
+        let d = [
+            f32x16::load_array_ref(simd, x) - fx,
+            f32x16::load_array_ref(simd, y) - fy,
+            f32x16::load_array_ref(simd, z) - fz,
+        ];
+        let t = along(d, self.along);
+        let [ax, ay, az] = self.along;
+        let off = squared([d[0] - t * ax, d[1] - t * ay, d[2] - t * az]);
+        let reach = f32x16::load_array_ref(simd, &reaches) + self.thick;
+        let beyond: mask32x16<S> =
+            off.simd_gt(reach * reach) | (t - reach).simd_gt(self.most) | (t + reach).simd_lt(0.0);
+        !bits(beyond) & ((1 << count) - 1)
+    }
+
+    /// Compares the ray with the part of a point.
+    fn compare(&mut self, i: usize) -> ControlFlow<()> {
+        let (elements, ray) = (self.elements, self.ray);
+        if elements.is_doubtful(i) {
+            self.is_doubtful = true;
+            return ControlFlow::Continue(());
+        }
+        let crossing = match elements.element(i) {
+            Element::Ball(centre, radius) => {
+                let t = enters(&ray, &centre, radius + ray.radius);
+                t.map(|t| Crossing { t, i, beside: 0.0, cosine: 1.0 })
+            }
+            Element::Disc(disc) => {
+                let cell = f64::from(elements.arrays.cell_radius(i));
+                self.is_doubtful = self.is_doubtful || passes_cell(elements, &ray, i, cell);
+                meets(&ray, &disc, i, cell.max(disc.radius))
+            }
+        };
+        let Some(crossing) = crossing.filter(|it| it.t <= ray.max) else {
+            return ControlFlow::Continue(());
+        };
+        self.found.push(crossing);
+        if !crossing.is_sure() {
+            return ControlFlow::Continue(());
+        }
+        match self.wanted {
+            Wanted::Any => return ControlFlow::Break(()),
+            Wanted::First => {
+                let end = (crossing.t + crossing.layer(elements)).min(ray.max);
+                if end < self.skipped + f64::from(self.most) {
+                    self.limit(end);
+                }
+            }
+            Wanted::All => {}
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The distance at which a ray enters a ball; 0 if it starts inside.
+fn enters(ray: &StoredRay, centre: &Vector, radius: f64) -> Option<f64> {
+    let middle = (centre - ray.origin).dot(&ray.direction);
+    let off_sq = (centre - ray.at(middle)).norm_squared();
+    let half_sq = radius * radius - off_sq;
+    let half = if half_sq >= 0.0 { half_sq.sqrt() } else { return None };
+    (middle + half >= 0.0).then(|| (middle - half).max(0.0))
+}
+
+/// Where a ray meets a disc, or the plane of the disc up to `cell` from its centre.
+fn meets(ray: &StoredRay, disc: &FlatDisc, i: usize, cell: f64) -> Option<Crossing> {
+    let cosine = disc.normal.dot(&ray.direction);
+    let height = disc.normal.dot(&(ray.origin - disc.centre));
+    if ray.radius == 0.0 {
+        let t = -height / cosine;
+        if !(t >= 0.0 && t.is_finite()) {
+            return None;
+        }
+        let beside = (ray.at(t) - disc.centre).norm();
+        return (beside <= cell).then(|| Crossing {
+            t,
+            i,
+            beside: beside / disc.radius,
+            cosine: cosine.abs(),
+        });
+    }
+    let touches = |t: f64| {
+        let x = ray.at(t);
+        let way = x - disc.nearest(&x);
+        let distance = way.norm();
+        (distance - ray.radius, if distance > 0.0 { way.dot(&ray.direction) / distance } else { -1.0 })
+    };
+    let middle = (disc.centre - ray.origin).dot(&ray.direction);
+    let mut t = (middle - disc.radius - ray.radius).max(0.0);
+    // The distance is convex along the ray, so Newton's steps from before do not pass the first zero.
+    for _ in 0..64 {
+        let (apart, slope) = touches(t);
+        if apart <= 1e-9 * (ray.radius + disc.radius) {
+            let on_disc = disc.nearest(&ray.at(t));
+            let beside = (on_disc - disc.centre).norm() / disc.radius;
+            return Some(Crossing { t, i, beside: beside.min(1.0), cosine: cosine.abs() });
+        }
+        if slope >= 0.0 {
+            break;
+        }
+        t -= apart / slope;
+    }
+    // A ball may also pass between discs.
+    let t = (-height + ray.radius.copysign(height)) / cosine;
+    let beside = (ray.at(t) - disc.centre - disc.normal * ray.radius.copysign(height)).norm();
+    let is_hole = t >= 0.0 && t.is_finite() && beside > disc.radius && beside <= cell;
+    is_hole.then(|| Crossing { t, i, beside: beside / disc.radius, cosine: cosine.abs() })
+}
+
+/// Returns `true` if a ray, with its radius, may pass through the cell of a point on a sheet.
+fn passes_cell(elements: &Elements<'_>, ray: &StoredRay, i: usize, cell: f64) -> bool {
+    let (centre, normal) = (elements.position(i), elements.normal(i));
+    let middle = (centre - ray.origin).dot(&ray.direction);
+    let off_sq = (centre - ray.at(middle)).norm_squared();
+    let reach = cell.max(f64::from(elements.arrays.obstacle_reach(i))) + ray.radius;
+    let half_sq = reach * reach * (1.0 + 1e-9) - off_sq;
+    if half_sq < 0.0 {
+        return false;
+    }
+    let half = half_sq.sqrt();
+    let (from, to) = ((middle - half).max(0.0), (middle + half).min(ray.max));
+    let layer = f64::from(SLAB * elements.arrays.radii[i]) * (1.0 + 1e-6) + ray.radius;
+    let heights = [from, to].map(|t| normal.dot(&(ray.at(t) - centre)));
+    let is_beside = heights.iter().all(|&h| h > layer) || heights.iter().all(|&h| h < -layer);
+    from <= to && !is_beside
+}
+
+impl PlaceVisitor for Cast<'_, '_> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.most_sq
+    }
+
+    /// The squared distances along the ray at which it enters the enclosures of four nodes, grown by
+    /// its radius; infinite where it passes beside.
+    #[inline(always)]
+    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
+        let elements = self.elements;
+        let nodes = elements.arrays.tree.bounds_of_children(simd, elements.part(), node);
+        let [fx, fy, fz] = self.from;
+        let d = [nodes.centre[0] - fx, nodes.centre[1] - fy, nodes.centre[2] - fz];
+        let zero = f32x4::splat(simd, 0.0);
+        let infinite = f32x4::splat(simd, f32::INFINITY);
+        let tiny = f32x4::splat(simd, 1e-12);
+        let (mut enter, mut exit) = (zero, f32x4::splat(simd, f32::MAX));
+        for k in 0..3 {
+            let [x, y, z] = nodes.axes[k];
+            let at = product([x, y, z], d);
+            let speed = x * self.along[0] + y * self.along[1] + z * self.along[2];
+            let is_still: mask32x4<S> = speed.abs().simd_lt(tiny);
+            let speed = is_still.select(tiny, speed);
+            let per_speed = f32x4::splat(simd, 1.0) / speed;
+            let half = nodes.half[k] + self.thick;
+            let near = (at - half - nodes.low[k]) * per_speed;
+            let far = (at + half + nodes.high[k]) * per_speed;
+            enter = enter.max(near.min(far));
+            exit = exit.min(near.max(far));
+        }
+        let passes: mask32x4<S> = enter.simd_le(exit);
+        passes.select(enter * enter, infinite)
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        let elements = self.elements;
+        if elements.certifies && elements.semantics == Semantics::Surface {
+            self.is_doubtful = true;
+        }
+        for (_, first, count) in elements.arrays.leaves.blocks(number) {
+            for lane in Bits(self.near(simd, first, count)) {
+                self.compare(first + lane)?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

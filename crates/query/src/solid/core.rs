@@ -1,0 +1,338 @@
+//! Convex shapes in the stored frame of a scan: a core, and a radius about it.
+
+use nearmiss_geometry::Pose;
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_mesh::nearest_on_triangle;
+
+use crate::leaf::disc_triangle::FlatDisc;
+use crate::solid::closest::{Closest, closest};
+use crate::solid::shape::{Shape, SupportMap};
+
+type Vector = Vector3<f64>;
+
+/// A convex shape without its radius, in the stored frame of a scan.
+#[derive(Debug, Clone, Copy)]
+enum Core<'a> {
+    Point,
+    /// A segment from the centre to both sides.
+    Segment,
+    /// The bounding box itself.
+    Box,
+    /// A truncated cone about the second axis of the bounding box, with these radii below and above.
+    Round([f64; 2]),
+    Triangle([Vector; 3]),
+    Hull(&'a [[f64; 3]], &'a Pose),
+    Own(&'a dyn SupportMap, &'a Pose),
+}
+
+/// A convex shape in the stored frame of a scan.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Solid<'a> {
+    core: Core<'a>,
+    /// The radius about the core.
+    pub(crate) radius: f64,
+    /// The centre of a box about the core.
+    pub(crate) centre: Vector,
+    /// Unit directions of its edges.
+    pub(crate) axes: [Vector; 3],
+    /// Half its edge lengths.
+    pub(crate) half: Vector,
+    /// A point inside the shape, which tells the side on which it is.
+    pub(crate) inside: Vector,
+}
+
+/// The nearest points of a core and a disc.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gap {
+    /// The distance of the points: an upper bound.
+    pub(crate) distance: f64,
+    /// A lower bound.
+    pub(crate) lower: f64,
+    pub(crate) on_core: Vector,
+    pub(crate) on_disc: Vector,
+}
+
+impl Gap {
+    fn of(on_core: Vector, on_disc: Vector) -> Self {
+        let distance = (on_core - on_disc).norm();
+        Self { distance, lower: distance * (1.0 - 1e-9), on_core, on_disc }
+    }
+}
+
+impl From<Closest> for Gap {
+    fn from(Closest { points: [on_core, on_disc], distance, lower }: Closest) -> Self {
+        Self { distance, lower, on_core, on_disc }
+    }
+}
+
+impl<'a> Solid<'a> {
+    /// Moves a shape into a stored frame, whose pose in the world is `placed`. `None` if the shape is
+    /// invalid.
+    pub(crate) fn new(shape: &Shape<'a>, placed: &'a Pose) -> Option<Self> {
+        if !shape.is_valid() {
+            return None;
+        }
+        let into = |p: [f64; 3]| Vector::from(placed.apply_inverse(p));
+        let axes_of = |pose: &Pose| {
+            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                .map(|axis| Vector::from(placed.rotate_inverse(pose.rotate(axis))))
+        };
+        let radius = shape.rounding() / placed.scale();
+        let upright = [Vector::x(), Vector::y(), Vector::z()];
+        let (core, centre, axes, half) = match *shape {
+            Shape::Sphere { centre, .. } => (Core::Point, into(centre), upright, Vector::zeros()),
+            Shape::Capsule { ends, .. } => {
+                let [p, q] = ends.map(into);
+                let (along, centre) = (0.5 * (q - p), 0.5 * (p + q));
+                let length = along.norm();
+                if length == 0.0 {
+                    (Core::Point, centre, upright, Vector::zeros())
+                } else {
+                    (Core::Segment, centre, frame(along / length), Vector::new(length, 0.0, 0.0))
+                }
+            }
+            Shape::Box { pose, half, .. } => {
+                let half = Vector::from(half) * (pose.scale() / placed.scale());
+                (Core::Box, into(pose.translation()), axes_of(&pose), half)
+            }
+            Shape::Cylinder { pose, half_height, radius, .. }
+            | Shape::Cone { pose, half_height, radius, .. } => {
+                let scale = pose.scale() / placed.scale();
+                let (h, r) = (half_height * scale, radius * scale);
+                let above = if matches!(shape, Shape::Cylinder { .. }) { r } else { 0.0 };
+                (Core::Round([r, above]), into(pose.translation()), axes_of(&pose), Vector::new(r, h, r))
+            }
+            Shape::Triangle { points, .. } => {
+                let corners = points.map(into);
+                let along = (corners[1] - corners[0]).try_normalize(0.0).unwrap_or_else(Vector::x);
+                let other = corners[2] - corners[0];
+                let across = (other - along * along.dot(&other)).try_normalize(0.0);
+                let across = across.unwrap_or_else(|| frame(along)[1]);
+                let axes = [along, across, along.cross(&across)];
+                let (centre, half) = spanned(&axes, |d| extreme(corners.iter().copied(), d));
+                (Core::Triangle(corners), centre, axes, half)
+            }
+            Shape::Hull { points, .. } => {
+                let of = |d: &Vector| extreme(points.iter().map(|&p| into(p)), d);
+                let (centre, half) = spanned(&upright, of);
+                (Core::Hull(points, placed), centre, upright, half)
+            }
+            Shape::Own { map, .. } => {
+                let core = Core::Own(map, placed);
+                let probe = Self {
+                    core,
+                    radius,
+                    centre: Vector::zeros(),
+                    axes: upright,
+                    half: Vector::zeros(),
+                    inside: Vector::zeros(),
+                };
+                let (centre, half) = spanned(&upright, |d| probe.support(d));
+                (core, centre, upright, half)
+            }
+        };
+        let inside = match *shape {
+            Shape::Own { map, .. } => into(map.centre()),
+            Shape::Cone { .. } => centre - axes[1] * (0.5 * half.y),
+            Shape::Triangle { points: [p, q, r], .. } => (into(p) + into(q) + into(r)) / 3.0,
+            Shape::Hull { points, .. } => {
+                #[expect(clippy::cast_precision_loss, reason = "a mean")]
+                let count = points.len() as f64;
+                points.iter().map(|&p| into(p) / count).sum()
+            }
+            _ => centre,
+        };
+        let is_finite = [centre, half, inside].iter().all(|v| v.iter().all(|c| c.is_finite()));
+        (is_finite && radius.is_finite()).then_some(Self { core, radius, centre, axes, half, inside })
+    }
+
+    /// Returns `true` if distances of the core from points are those of its bounding box.
+    pub(crate) fn is_box(&self) -> bool {
+        matches!(self.core, Core::Point | Core::Segment | Core::Box)
+    }
+
+    pub(crate) fn is_point(&self) -> bool {
+        matches!(self.core, Core::Point)
+    }
+
+    fn ends(&self) -> [Vector; 2] {
+        let along = self.axes[0] * self.half.x;
+        [self.centre - along, self.centre + along]
+    }
+
+    /// The lowest place, against `out`, of a core that is a segment within the cylinder over a disc with
+    /// that axis. `None` if the core is no segment, or is beside the cylinder.
+    pub(crate) fn lowest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
+        if !matches!(self.core, Core::Segment) {
+            return None;
+        }
+        let [p, q] = self.ends();
+        let across = |v: Vector| v - out * out.dot(&v);
+        let (from, way) = (across(p - disc.centre), across(q - p));
+        let (a, b) = (way.norm_squared(), from.dot(&way));
+        let c = from.norm_squared() - disc.radius * disc.radius;
+        let (low, high) = if a > 0.0 {
+            let root = (b * b - a * c).max(0.0).sqrt();
+            (((-b - root) / a).max(0.0), ((-b + root) / a).min(1.0))
+        } else {
+            (0.0, 1.0)
+        };
+        let is_over = low <= high && (a == 0.0 && c <= 0.0 || b * b >= a * c);
+        let lower = if out.dot(&(q - p)) < 0.0 { high } else { low };
+        is_over.then(|| p + (q - p) * lower)
+    }
+
+    /// The point of the core furthest along `d`.
+    pub(crate) fn support(&self, d: &Vector) -> Vector {
+        match self.core {
+            Core::Point => self.centre,
+            Core::Segment | Core::Box => (0..3)
+                .fold(self.centre, |p, k| p + self.axes[k] * self.half[k].copysign(d.dot(&self.axes[k]))),
+            Core::Round(radii) => {
+                let axis = self.axes[1];
+                let across = d - axis * axis.dot(d);
+                let length = across.norm();
+                let out = if length > 0.0 { across / length } else { Vector::zeros() };
+                let [low, high] = [-1.0, 1.0].map(|side: f64| {
+                    let radius = radii[usize::from(side > 0.0)];
+                    self.centre + axis * (side * self.half.y) + out * radius
+                });
+                if d.dot(&(high - low)) > 0.0 { high } else { low }
+            }
+            Core::Triangle(corners) => extreme(corners.into_iter(), d),
+            Core::Hull(points, placed) => {
+                let towards = Vector::from(placed.rotate((*d).into()));
+                let furthest = extreme(points.iter().map(|&p| Vector::from(p)), &towards);
+                placed.apply_inverse(furthest.into()).into()
+            }
+            Core::Own(map, placed) => placed.apply_inverse(map.support(placed.rotate((*d).into()))).into(),
+        }
+    }
+
+    /// The point of the core nearest to `x`.
+    pub(crate) fn nearest(&self, x: &Vector) -> Vector {
+        let away = x - self.centre;
+        match self.core {
+            Core::Point => self.centre,
+            Core::Segment | Core::Box => (0..3).fold(self.centre, |p, k| {
+                p + self.axes[k] * away.dot(&self.axes[k]).clamp(-self.half[k], self.half[k])
+            }),
+            Core::Round([below, above]) => {
+                let axis = self.axes[1];
+                let height = axis.dot(&away);
+                let across = away - axis * height;
+                let beside = across.norm();
+                let out = if beside > 0.0 { across / beside } else { Vector::zeros() };
+                let [radius, height] = in_trapezium([beside, height], self.half.y, [below, above]);
+                self.centre + axis * height + out * radius
+            }
+            Core::Triangle(corners) => nearest_on_triangle(&corners.map(Into::into), (*x).into()).into(),
+            Core::Hull(..) | Core::Own(..) => {
+                // Relative to x, so that rounding is relative to the distance.
+                let support = |d: &Vector| [self.support(d) - x, Vector::zeros()];
+                x + closest(support, self.inside - x, f64::INFINITY).points[0]
+            }
+        }
+    }
+
+    /// The distance of `x` from the core.
+    pub(crate) fn distance(&self, x: &Vector) -> f64 {
+        (x - self.nearest(x)).norm()
+    }
+
+    /// The nearest points of the core and a disc; any two points if their distance exceeds `beyond`.
+    pub(crate) fn gap(&self, disc: &FlatDisc, beyond: f64) -> Gap {
+        match self.core {
+            Core::Point => Gap::of(self.centre, disc.nearest(&self.centre)),
+            Core::Segment => {
+                let [p, q] = self.ends();
+                let x = p + (q - p) * disc.nearest_share(p, q - p);
+                Gap::of(x, disc.nearest(&x))
+            }
+            Core::Triangle(corners) => {
+                let found = disc.nearest_to(&corners.map(Into::into));
+                Gap::of(found.on_triangle, found.on_disc)
+            }
+            Core::Box | Core::Round(_) => {
+                self.projected(disc).unwrap_or_else(|start| self.iterated(disc, start, beyond))
+            }
+            Core::Hull(..) | Core::Own(..) => self.iterated(disc, self.inside - disc.centre, beyond),
+        }
+    }
+
+    /// The nearest points of the core and a disc, if each is soon the point nearest to the other.
+    /// Otherwise the difference of the last two.
+    fn projected(&self, disc: &FlatDisc) -> Result<Gap, Vector> {
+        const ROUNDS: u32 = 3;
+        /// In disc radii.
+        const SAME: f64 = 1e-10;
+        let mut on_core = self.nearest(&disc.centre);
+        for _ in 0..ROUNDS {
+            let on_disc = disc.nearest(&on_core);
+            let next = self.nearest(&on_disc);
+            let is_same = (next - on_core).norm_squared() <= (SAME * disc.radius).powi(2);
+            on_core = next;
+            if is_same {
+                let way = on_core - on_disc;
+                let distance = way.norm();
+                // From the plane across the way between them.
+                let apart = self.support(&-way) - disc.centre - disc.rim(&way);
+                let lower = if distance > 0.0 { way.dot(&apart) / distance } else { 0.0 };
+                return Ok(Gap { distance, lower: lower.clamp(0.0, distance), on_core, on_disc });
+            }
+        }
+        Err(on_core - disc.nearest(&on_core))
+    }
+
+    /// The nearest points of the core and a disc by their support maps.
+    fn iterated(&self, disc: &FlatDisc, start: Vector, beyond: f64) -> Gap {
+        // Relative to the centre of the disc, so that rounding is relative to the distance.
+        let centre = disc.centre;
+        let support = |d: &Vector| [self.support(d) - centre, disc.rim(&-d)];
+        let Closest { points, distance, lower } = closest(support, start, beyond);
+        Closest { points: points.map(|p| p + centre), distance, lower }.into()
+    }
+}
+
+/// An orthonormal frame whose first axis is `along`.
+fn frame(along: Vector) -> [Vector; 3] {
+    let least = along.iamin();
+    let other = Vector::from_fn(|k, _| if k == least { 1.0 } else { 0.0 });
+    let across = along.cross(&other).normalize();
+    [along, across, along.cross(&across)]
+}
+
+/// The first of the points that are furthest along `d`.
+fn extreme(points: impl Iterator<Item = Vector>, d: &Vector) -> Vector {
+    let furthest = points.map(|p| (p.dot(d), p)).reduce(|best, own| if own.0 > best.0 { own } else { best });
+    furthest.map_or_else(Vector::zeros, |(_, p)| p)
+}
+
+/// The centre and half the edge lengths of a box along `axes` about a shape with this support map.
+fn spanned(axes: &[Vector; 3], support: impl Fn(&Vector) -> Vector) -> (Vector, Vector) {
+    let ends = axes.map(|axis| [-axis, axis].map(|d| axis.dot(&support(&d))));
+    let centre = (0..3).map(|k| axes[k] * (0.5 * ends[k][0] + 0.5 * ends[k][1])).sum();
+    (centre, Vector::from(ends.map(|[low, high]| 0.5 * high - 0.5 * low)))
+}
+
+/// The point nearest to `p` of the section of a truncated cone: (distance from the axis, height).
+fn in_trapezium(p: [f64; 2], half: f64, [below, above]: [f64; 2]) -> [f64; 2] {
+    let [beside, height] = p;
+    let side = [above - below, 2.0 * half];
+    // Inside, if it is neither above, nor below, nor to the outer side of the slanted side.
+    let within = side[1] * (beside - below) - side[0] * (height + half) <= 0.0;
+    if within && height.abs() <= half {
+        return p;
+    }
+    let lids = [[beside.min(below), -half], [beside.min(above), half]];
+    let square = side[0] * side[0] + side[1] * side[1];
+    let share = if square > 0.0 {
+        (((beside - below) * side[0] + (height + half) * side[1]) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    let slanted = [below + side[0] * share, -half + side[1] * share];
+    let apart_sq = |q: [f64; 2]| (q[0] - beside).powi(2) + (q[1] - height).powi(2);
+    let nearer = |a: [f64; 2], b: [f64; 2]| if apart_sq(b) < apart_sq(a) { b } else { a };
+    nearer(nearer(lids[0], lids[1]), slanted)
+}

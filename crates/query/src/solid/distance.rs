@@ -1,0 +1,147 @@
+//! Bounds on the distance of a shape and a scan.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::{Level, Simd, f32x4};
+use nearmiss_geometry::NodeId;
+use nearmiss_hierarchy::{PlaceVisitor, Siblings};
+use nearmiss_lanes::wide::Bits;
+
+use crate::ask::answer::Evidence;
+use crate::ask::options::Semantics;
+use crate::solid::answer::ShapeDistance;
+use crate::solid::core::{Gap, Solid};
+use crate::solid::descent::Near;
+use crate::solid::elements::Elements;
+
+/// The search for the nearest disc or ball, nearest node first.
+struct Apart<'s, 'a> {
+    near: Near<'s, 'a>,
+    /// The least distance of the shape so far, and its point.
+    upper: f64,
+    best: Option<(usize, Gap)>,
+    /// The least lower bound of any point that was compared.
+    lower: f64,
+}
+
+/// Bounds the distance of `solid` and the scan, up to `within` in the world. `None` if it is further
+/// away, or invalid.
+pub(crate) fn distance(
+    elements: &Elements<'_>,
+    solid: Option<&Solid<'_>>,
+    within: f64,
+    level: Level,
+) -> Option<ShapeDistance> {
+    let solid = solid?;
+    let scale = elements.scale();
+    // Enclosures, because the nearest place of the obstacle may be outside the boxes.
+    let near = Near::new(elements, solid, elements.certifies);
+    let mut search = Apart { near, upper: f64::INFINITY, best: None, lower: f64::INFINITY };
+    search.near.limit(within / scale);
+    let centre = search.near.lane_box.centre;
+    // Ends early if they touch.
+    let _touching = elements.arrays.tree.descend_to(level, centre, &mut search);
+    let (i, gap) = search.best.filter(|_| search.upper * scale <= within)?;
+    let upper = search.upper;
+    let lower = match elements.semantics {
+        Semantics::Thickened(_) => upper,
+        _ if !elements.certifies => 0.0,
+        _ => search.lower.clamp(0.0, upper),
+    };
+    // From the core to the shape.
+    let way = gap.on_disc - gap.on_core;
+    let length = way.norm();
+    let share = if length > 0.0 { (solid.radius / length).min(1.0) } else { 0.0 };
+    let is_ball = !elements.is_disc(i);
+    Some(ShapeDistance {
+        lower: lower * scale,
+        upper: upper * scale,
+        points: [elements.in_world(&gap.on_disc), elements.in_world(&(gap.on_core + way * share))],
+        source: elements.placed.scan().id(i),
+        band: elements.band(i),
+        evidence: if is_ball { Evidence::Certified } else { Evidence::Estimated },
+    })
+}
+
+impl Apart<'_, '_> {
+    /// Compares the shape with the part of a point.
+    fn compare(&mut self, i: usize) -> ControlFlow<()> {
+        let Near { elements, solid, .. } = self.near;
+        if elements.is_doubtful(i) {
+            return ControlFlow::Continue(());
+        }
+        let (gap, thick) = elements.gap(solid, i, self.upper);
+        let distance = gap.distance - solid.radius;
+        let distance = if distance <= thick { 0.0 } else { distance };
+        if distance < self.upper {
+            (self.upper, self.best) = (distance, Some((i, gap)));
+            self.near.limit(distance);
+        }
+        if self.upper == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Updates the lower bound by the obstacle near a point.
+    fn bound(&mut self, i: usize, by_lanes: f64) {
+        let Near { elements, solid, .. } = self.near;
+        let own = if solid.is_box() && by_lanes > 0.0 {
+            by_lanes
+        } else {
+            by_lanes.max(elements.cell_gap(solid, i) - solid.radius)
+        };
+        self.lower = self.lower.min(own);
+    }
+}
+
+impl PlaceVisitor for Apart<'_, '_> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.near.most_sq
+    }
+
+    #[inline(always)]
+    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
+        self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
+    }
+
+    #[inline(always)]
+    fn is_wanted(&mut self, _: NodeId, least_sq: f32) -> bool {
+        self.near.node_sq = least_sq;
+        least_sq <= self.near.most_sq
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        let elements = self.near.elements;
+        let node_gap = self.near.node_gap();
+        if elements.semantics == Semantics::Surface {
+            self.lower = self.lower.min(node_gap);
+        }
+        for (block, first, count) in elements.arrays.leaves.blocks(number) {
+            let gaps = elements.leaf_gaps(simd, &self.near.lane_box, (number, block, first, count));
+            let mut left = Elements::within(simd, (&gaps.elements, count), self.near.most);
+            while left != 0 {
+                let mut lane = left.trailing_zeros() as usize;
+                for other in Bits(left) {
+                    if gaps.elements[other] < gaps.elements[lane] {
+                        lane = other;
+                    }
+                }
+                left &= !(1 << lane);
+                if gaps.elements[lane] > self.near.most {
+                    break;
+                }
+                self.compare(first + lane)?;
+            }
+            if elements.certifies && elements.semantics == Semantics::Obstacle {
+                let upper = self.lower.min(self.upper);
+                for lane in Bits(Elements::within(simd, (&gaps.cells, count), self.near.most)) {
+                    let by_lanes = self.near.gap_of_shape(gaps.cells[lane]).max(node_gap);
+                    if by_lanes < upper.min(self.lower) {
+                        self.bound(first + lane, by_lanes);
+                    }
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,303 @@
+//! The parts of a scan that shapes are compared with: a disc or a ball for each point, and the volume
+//! that contains the obstacle near each point.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{LeafBlock, Part, SLAB, ScanArrays, THICKNESS};
+use nearmiss_lanes::wide::bits;
+
+use crate::ask::answer::Evidence;
+use crate::ask::options::Semantics;
+use crate::leaf::disc_triangle::FlatDisc;
+use crate::pair::placed::Placed;
+use crate::solid::core::{Gap, Solid};
+use crate::solid::lanes::LaneBox;
+use crate::solid::plan::ShapePlan;
+
+type Vector = Vector3<f64>;
+
+const WIDTH: usize = LeafBlock::WIDTH;
+
+/// Steps of a component of a normal in a [`LeafBlock`].
+const STEPS: f32 = 32767.0;
+
+/// The part of one point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Element {
+    /// A tangent disc.
+    Disc(FlatDisc),
+    /// A ball about the point.
+    Ball(Vector, f64),
+}
+
+/// A scan with the meaning of a plan, in its stored frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Elements<'a> {
+    pub(crate) placed: Placed<'a>,
+    pub(crate) arrays: ScanArrays<'a>,
+    pub(crate) plan: ShapePlan,
+    pub(crate) semantics: Semantics,
+    /// The margin in the stored frame.
+    pub(crate) margin: f64,
+    /// The radius of thickened points in the stored frame.
+    thickened: f64,
+    /// The greatest coordinate of the scan.
+    pub(crate) far: f64,
+    /// `true` if enclosures prove separations.
+    pub(crate) certifies: bool,
+}
+
+/// Lower bounds on the distances of a core from the parts of sixteen points; infinite in unused lanes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeafGaps {
+    /// From the discs, with their thickness, and from the balls.
+    pub(crate) elements: [f32; WIDTH],
+    /// From the volumes that contain the obstacle near the points.
+    pub(crate) cells: [f32; WIDTH],
+}
+
+/// The sizes of the parts of sixteen points.
+struct Parts<S: Simd> {
+    /// The radii of discs and balls.
+    radii: f32x16<S>,
+    /// The radii about the points that contain the obstacle near them, and half its thickness.
+    reaches: f32x16<S>,
+    slabs: f32x16<S>,
+    discs: mask32x16<S>,
+}
+
+impl<'a> Elements<'a> {
+    pub(crate) fn new(placed: Placed<'a>, plan: &ShapePlan) -> Self {
+        let arrays = placed.scan().arrays();
+        let options = plan.options();
+        let scale = placed.stored_to_world().scale();
+        let thickened = match options.semantics {
+            Semantics::Thickened(radius) => radius / scale,
+            _ => 0.0,
+        };
+        let bounds = placed.scan().root_box();
+        let far = Vector3::from(bounds.centre).amax() + bounds.radius();
+        Self {
+            placed,
+            arrays,
+            plan: *plan,
+            semantics: options.semantics,
+            margin: options.margin / scale,
+            thickened,
+            far: f64::from(far) + thickened,
+            certifies: options.certifies(),
+        }
+    }
+
+    pub(crate) fn scale(&self) -> f64 {
+        self.placed.stored_to_world().scale()
+    }
+
+    pub(crate) fn part(&self) -> Part {
+        self.semantics.part()
+    }
+
+    /// The radius by which points exceed the boxes of their nodes.
+    pub(crate) fn beyond_boxes(&self) -> f64 {
+        self.thickened
+    }
+
+    pub(crate) fn position(&self, i: usize) -> Vector {
+        self.arrays.position(i).map(f64::from).into()
+    }
+
+    pub(crate) fn normal(&self, i: usize) -> Vector {
+        Vector::from(self.arrays.normals[i].map(f64::from)).normalize()
+    }
+
+    /// The local radius of a point, in the world.
+    pub(crate) fn band(&self, i: usize) -> f64 {
+        f64::from(self.arrays.radii[i]) * self.scale()
+    }
+
+    /// The greatest local radius, in the world.
+    pub(crate) fn greatest_band(&self) -> f64 {
+        f64::from(self.arrays.tree.root_box().reach) * self.scale()
+    }
+
+    /// Returns `true` if a disc represents the point.
+    pub(crate) fn is_disc(&self, i: usize) -> bool {
+        match self.semantics {
+            Semantics::Obstacle => self.arrays.is_on_sheet(i),
+            Semantics::Surface => !self.is_doubtful(i),
+            Semantics::Thickened(_) => false,
+        }
+    }
+
+    /// Returns `true` if the surface near the point is not known, and surfaces are compared.
+    pub(crate) fn is_doubtful(&self, i: usize) -> bool {
+        self.semantics == Semantics::Surface && self.placed.scan().kind(i).is_sparse()
+    }
+
+    /// The radius of the disc or ball of a point.
+    fn radius(&self, i: usize) -> f32 {
+        #[expect(clippy::cast_possible_truncation, reason = "the exact test is in double precision")]
+        match self.semantics {
+            Semantics::Thickened(_) => (self.thickened as f32).next_up(),
+            Semantics::Surface if self.is_doubtful(i) => self.arrays.ball(i),
+            Semantics::Obstacle if !self.is_disc(i) => self.arrays.obstacle_ball(i),
+            _ => self.arrays.discs.get(i),
+        }
+    }
+
+    /// The part of a point.
+    pub(crate) fn element(&self, i: usize) -> Element {
+        let centre = self.position(i);
+        if self.is_disc(i) {
+            let radius = f64::from(self.arrays.discs.get(i));
+            return Element::Disc(FlatDisc { centre, normal: self.normal(i), radius });
+        }
+        let radius = match self.semantics {
+            Semantics::Thickened(_) => self.thickened,
+            _ => f64::from(self.radius(i)),
+        };
+        Element::Ball(centre, radius)
+    }
+
+    /// The nearest points of a core and the part of a point, less its ball. Also the distance up to
+    /// which they meet without a margin. If the shape is further away than `most` and than that, any
+    /// distance that exceeds both.
+    pub(crate) fn gap(&self, solid: &Solid<'_>, i: usize, most: f64) -> (Gap, f64) {
+        match self.element(i) {
+            Element::Disc(disc) => {
+                let thick = f64::from(THICKNESS) * disc.radius;
+                (solid.gap(&disc, solid.radius + most.max(thick)), thick)
+            }
+            Element::Ball(centre, radius) => {
+                let on_core = solid.nearest(&centre);
+                let away = on_core - centre;
+                let length = away.norm();
+                let on_ball = if length > radius { centre + away * (radius / length) } else { on_core };
+                let distance = length - radius;
+                (Gap { distance, lower: distance - 1e-12 * length, on_core, on_disc: on_ball }, 0.0)
+            }
+        }
+    }
+
+    /// A lower bound on the distance of a core from the obstacle near a point.
+    pub(crate) fn cell_gap(&self, solid: &Solid<'_>, i: usize) -> f64 {
+        let reach = f64::from(self.arrays.obstacle_reach(i));
+        let centre = self.position(i);
+        let by_ball = solid.distance(&centre) * (1.0 - 1e-9) - reach;
+        if !self.arrays.is_on_sheet(i) {
+            return by_ball;
+        }
+        let disc = FlatDisc { centre, normal: self.normal(i), radius: reach };
+        by_ball.max(
+            solid.gap(&disc, f64::INFINITY).lower - f64::from(SLAB * self.arrays.radii[i]) * (1.0 + 1e-6),
+        )
+    }
+
+    /// Compares a core with the points of a block of a leaf, given by its number.
+    #[inline(always)]
+    pub(crate) fn leaf_gaps<S: Simd>(
+        &self,
+        simd: S,
+        lane_box: &LaneBox,
+        (leaf, block, first, count): (usize, &LeafBlock, usize, usize),
+    ) -> LeafGaps {
+        let parts = self.parts(simd, leaf, (block, first, count));
+        let used = mask32x16::from_bitmask(simd, (1_u64 << count) - 1);
+        let none = f32x16::splat(simd, f32::INFINITY);
+        // Positions are off by a step, and normals by less than a step in each component.
+        let [x, y, z] = block.half;
+        let step = 2.0 * (x * x + y * y + z * z).sqrt() / STEPS;
+        let distances = lane_box.of_points(simd, &block.positions(simd), &block.normals(simd));
+        let tilt = (distances.from_point + lane_box.reach()) * (2.0 / STEPS) + (2.0 * step + lane_box.slack);
+        let elements = distances.from(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
+        let cells = if self.certifies && self.semantics == Semantics::Obstacle {
+            distances.from(simd, parts.reaches, parts.slabs, parts.discs) - tilt
+        } else {
+            elements
+        };
+        LeafGaps {
+            elements: used.select(elements, none).to_array(),
+            cells: used.select(cells, none).to_array(),
+        }
+    }
+
+    /// The sizes of the parts of the points in a block.
+    #[inline(always)]
+    fn parts<S: Simd>(
+        &self,
+        simd: S,
+        leaf: usize,
+        (block, first, count): (&LeafBlock, usize, usize),
+    ) -> Parts<S> {
+        let zero = f32x16::splat(simd, 0.0);
+        let is_whole = count == WIDTH && first.is_multiple_of(WIDTH);
+        let local: Option<&[f32; WIDTH]> =
+            self.arrays.radii.get(first..first + WIDTH).and_then(|radii| radii.try_into().ok());
+        if let Some(local) = local.filter(|_| is_whole && self.semantics == Semantics::Obstacle) {
+            let balls = if self.arrays.leaves.has_balls(leaf) {
+                f32x16::load_array_ref(simd, &self.arrays.obstacle_balls(first / WIDTH))
+            } else {
+                zero
+            };
+            let discs: mask32x16<S> = balls.simd_eq(zero);
+            let (local, of_discs) = (f32x16::load_array_ref(simd, local), block.discs(simd));
+            // As `ScanArrays::obstacle_reach`, with the thickness of a disc.
+            let of_cells = local.min(0.5 * self.arrays.reach).max(of_discs * (1.0 + THICKNESS));
+            return Parts {
+                radii: discs.select(of_discs, balls),
+                reaches: discs.select(of_cells, balls),
+                slabs: local * SLAB,
+                discs,
+            };
+        }
+        let (mut radii, mut reaches, mut slabs) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
+        let mut discs = 0_u64;
+        for (lane, i) in (first..first + count).enumerate() {
+            radii[lane] = self.radius(i);
+            reaches[lane] = self.arrays.obstacle_reach(i);
+            slabs[lane] = SLAB * self.arrays.radii[i];
+            discs |= u64::from(self.is_disc(i)) << lane;
+        }
+        Parts {
+            radii: f32x16::load_array_ref(simd, &radii),
+            reaches: f32x16::load_array_ref(simd, &reaches),
+            slabs: f32x16::load_array_ref(simd, &slabs),
+            discs: mask32x16::from_bitmask(simd, discs),
+        }
+    }
+
+    /// The first `count` lanes that are not further than `most`.
+    #[inline(always)]
+    pub(crate) fn within<S: Simd>(simd: S, (gaps, count): (&[f32; WIDTH], usize), most: f32) -> u32 {
+        // Not `<=`, which would be false for NaN.
+        let beyond: mask32x16<S> = f32x16::load_array_ref(simd, gaps).simd_gt(most);
+        !bits(beyond) & ((1 << count) - 1)
+    }
+
+    /// The radius about a point within which a ray may hit it.
+    #[inline]
+    pub(crate) fn ray_reach(&self, i: usize) -> f32 {
+        if self.is_disc(i) {
+            self.arrays.obstacle_reach(i).max(self.arrays.discs.get(i))
+        } else {
+            self.radius(i)
+        }
+    }
+
+    /// A point in the world.
+    pub(crate) fn in_world(&self, x: &Vector) -> [f64; 3] {
+        self.placed.stored_to_world().apply((*x).into())
+    }
+
+    /// A direction in the world.
+    pub(crate) fn turned(&self, n: &Vector) -> [f64; 3] {
+        self.placed.stored_to_world().rotate((*n).into())
+    }
+
+    /// The evidence for a separation in which no enclosure was within reach.
+    pub(crate) fn of_separation(&self, is_doubtful: bool) -> Evidence {
+        let is_proven = !is_doubtful && (self.certifies || matches!(self.semantics, Semantics::Thickened(_)));
+        if is_proven { Evidence::Certified } else { Evidence::Estimated }
+    }
+}

@@ -1,0 +1,156 @@
+//! Lower bounds on the distance of a shape from nodes and points, several at a time, in single
+//! precision.
+//!
+//! The shape is represented by the box about its core. Along the axes of either box the gap of two
+//! boxes is that of two intervals; the three gaps along orthogonal axes combine to a distance.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
+use nearmiss_hierarchy::NodeBounds;
+use nearmiss_lanes::wide::{Vectors, along, product, squared};
+
+use crate::solid::core::Solid;
+
+/// Rounding of distances, relative to all coordinates: as that of boxes in a relative pose.
+const ROUNDING: f64 = 8e-6;
+
+/// Coordinates beyond this have squares near the end of single precision.
+const FARTHEST: f64 = 1e15;
+
+/// The box about the core of a shape, in single precision.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LaneBox {
+    pub(crate) centre: [f32; 3],
+    axes: [[f32; 3]; 3],
+    half: [f32; 3],
+    is_point: bool,
+    /// `false` if coordinates are out of the range of single precision: then nothing is pruned.
+    pub(crate) is_near: bool,
+    /// The error of a distance.
+    pub(crate) slack: f32,
+}
+
+impl LaneBox {
+    /// The box of a shape near a scan whose coordinates are at most `far`.
+    #[expect(clippy::cast_possible_truncation, reason = "counted in `slack`")]
+    pub(crate) fn new(solid: &Solid<'_>, far: f64) -> Self {
+        let far = far + solid.centre.amax() + solid.half.sum() + solid.radius;
+        let single = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32];
+        Self {
+            centre: single(solid.centre.into()),
+            axes: solid.axes.map(|axis| single(axis.into())),
+            half: single(solid.half.into()),
+            is_point: solid.is_point(),
+            is_near: far < FARTHEST,
+            slack: (ROUNDING * far) as f32,
+        }
+    }
+
+    /// The distance from the centre to a corner.
+    #[inline(always)]
+    pub(crate) fn reach(&self) -> f32 {
+        let [x, y, z] = self.half;
+        x + y + z
+    }
+
+    /// Lower bounds, up to the slack, on the squared distances of the core from four nodes: from
+    /// their boxes or, if `grown`, from their enclosures.
+    #[inline(always)]
+    pub(crate) fn of_nodes<S: Simd>(&self, simd: S, nodes: &NodeBounds<f32x4<S>>, grown: bool) -> f32x4<S> {
+        let zero = f32x4::splat(simd, 0.0);
+        if !self.is_near {
+            return zero;
+        }
+        let [cx, cy, cz] = self.centre;
+        let d = [nodes.centre[0] - cx, nodes.centre[1] - cy, nodes.centre[2] - cz];
+        let mut sum = zero;
+        let mut outer = [zero; 3];
+        for k in 0..3 {
+            let [ax, ay, az] = nodes.axes[k];
+            let at = product([ax, ay, az], d);
+            let half = nodes.half[k];
+            let (low, high) = if grown { (half + nodes.low[k], half + nodes.high[k]) } else { (half, half) };
+            let mut reach = zero;
+            if !self.is_point {
+                let widest = low.max(high);
+                for j in 0..3 {
+                    let [x, y, z] = self.axes[j];
+                    let cosine = (ax * x + ay * y + az * z).abs();
+                    reach += cosine * self.half[j];
+                    outer[j] += cosine * widest;
+                }
+            }
+            let beyond = (at - low).max(-at - high) - reach;
+            let beyond = beyond.max(0.0);
+            sum += beyond * beyond;
+        }
+        if self.is_point {
+            return sum;
+        }
+        let mut other = zero;
+        for j in 0..3 {
+            let [x, y, z] = self.axes[j];
+            let at = (d[0] * x + d[1] * y + d[2] * z).abs();
+            let beyond = (at - outer[j] - self.half[j]).max(0.0);
+            other += beyond * beyond;
+        }
+        sum.max(other)
+    }
+
+    /// Lower bounds, up to the slack, on the distances of the core from points and their planes.
+    #[inline(always)]
+    pub(crate) fn of_points<S: Simd>(
+        &self,
+        simd: S,
+        points: &Vectors<S>,
+        normals: &Vectors<S>,
+    ) -> Distances<S> {
+        let zero = f32x16::splat(simd, 0.0);
+        if !self.is_near {
+            return Distances { from_point: zero, from_plane: zero, beside: zero };
+        }
+        let [cx, cy, cz] = self.centre;
+        let d = [points[0] - cx, points[1] - cy, points[2] - cz];
+        let height = product(d, *normals).abs();
+        if self.is_point {
+            let square = squared(d);
+            let beside = (square - height * height).max(0.0).sqrt();
+            return Distances { from_point: square.sqrt(), from_plane: height, beside };
+        }
+        let (mut sum, mut reach) = (zero, zero);
+        for j in 0..3 {
+            let axis = self.axes[j];
+            let beyond = (along(d, axis).abs() - self.half[j]).max(0.0);
+            sum += beyond * beyond;
+            reach += along(*normals, axis).abs() * self.half[j];
+        }
+        Distances { from_point: sum.sqrt(), from_plane: (height - reach).max(0.0), beside: zero }
+    }
+}
+
+/// Distances of a core from points and the planes through them.
+#[derive(Clone, Copy)]
+pub(crate) struct Distances<S: Simd> {
+    pub(crate) from_point: f32x16<S>,
+    pub(crate) from_plane: f32x16<S>,
+    /// The distance from the axis of each plane's normal; zero unless the core is a point.
+    beside: f32x16<S>,
+}
+
+impl<S: Simd> Distances<S> {
+    /// The distances of balls where `radii` are those of balls, and of discs where `are_discs`.
+    #[inline(always)]
+    pub(crate) fn from(
+        &self,
+        simd: S,
+        radii: f32x16<S>,
+        thick: f32x16<S>,
+        are_discs: mask32x16<S>,
+    ) -> f32x16<S> {
+        let zero = f32x16::splat(simd, 0.0);
+        let of_balls = self.from_point - radii;
+        let (up, out) = ((self.from_plane - thick).max(zero), (self.beside - radii).max(zero));
+        let of_discs = of_balls.max((up * up + out * out).sqrt());
+        are_discs.select(of_discs, of_balls)
+    }
+}

@@ -1,0 +1,43 @@
+//! Validated options for a scan and convex shapes.
+
+use nearmiss_hierarchy::PointHierarchy;
+
+use crate::ask::options::{CollideOptions, CollidePlan, Method, PlanError};
+
+/// A validated question about a scan and [shapes](crate::Shape) or [rays](crate::Ray). It serves
+/// every scan of the same [metric](PointHierarchy::metric), in any pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapePlan {
+    options: CollideOptions,
+}
+
+impl ShapePlan {
+    /// Validates `options`.
+    ///
+    /// The options have the meaning that they have for two scans ([`CollideOptions`]), with these
+    /// differences. A shape is exact, so with [`Semantics::Thickened`](crate::Semantics) only the
+    /// points of the scan have balls. With [`Detail::Verdict`](crate::Detail) nothing evaluates the
+    /// implicit function; with [`Detail::Witness`](crate::Detail) contacts, manifold points and hits
+    /// of rays are moved onto the surface, with a few evaluations each. The order is ignored.
+    ///
+    /// # Errors
+    /// Names the option that is out of range, or the metric that does not match. The methods of the
+    /// papers, and sphere coverings, are for two scans: either is [`PlanError::NotForShapes`].
+    pub fn new(options: &CollideOptions, scan: &PointHierarchy) -> Result<Self, PlanError> {
+        let refused = match options.method {
+            Method::Sampling(_) => Some("the method `sampling`"),
+            Method::Interpolation(_) => Some("the method `interpolation`"),
+            Method::Traversal => options.coverings.then_some("sphere coverings"),
+        };
+        if let Some(what) = refused {
+            return Err(PlanError::NotForShapes(what));
+        }
+        Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
+    }
+
+    /// The options that were validated, with the metric of the scan.
+    #[must_use]
+    pub fn options(&self) -> &CollideOptions {
+        &self.options
+    }
+}

@@ -1,0 +1,11 @@
+//! Reusable memory of questions about shapes and rays.
+
+use crate::solid::cast::Crossing;
+use crate::solid::contacts::Candidate;
+
+/// Reusable memory; never influences an answer.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SolidScratch {
+    pub(crate) candidates: Vec<Candidate>,
+    pub(crate) crossings: Vec<Crossing>,
+}

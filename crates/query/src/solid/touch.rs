@@ -1,0 +1,156 @@
+//! The search for a place where a shape touches a scan.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::{Level, Simd, f32x4};
+use nearmiss_geometry::NodeId;
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{PlaceVisitor, Siblings};
+use nearmiss_lanes::wide::Bits;
+
+use crate::ask::answer::{Evidence, Reason};
+use crate::ask::options::{Detail, Semantics};
+use crate::pair::placed::ViewScratch;
+use crate::solid::answer::{ShapeAnswer, ShapeVerdict};
+use crate::solid::core::Solid;
+use crate::solid::descent::Near;
+use crate::solid::elements::Elements;
+use crate::solid::meeting::verified_in;
+
+/// Discs at which a point of the surface in the shape is looked for.
+const TRIES: usize = 8;
+
+/// A disc or ball that touches the shape.
+#[derive(Debug, Clone, Copy)]
+struct Met {
+    i: usize,
+    /// A point of the disc or ball in the shape, or nearest to it.
+    point: Vector3<f64>,
+}
+
+struct Touch<'s, 'a> {
+    near: Near<'s, 'a>,
+    detail: Detail,
+    /// The first discs that touch.
+    met: [Option<Met>; TRIES],
+    count: usize,
+    certified: Option<Met>,
+    /// `true` if the shape is near a point about which nothing is known.
+    undersampled: bool,
+    /// `true` if an enclosure is within the margin.
+    doubtful: bool,
+}
+
+/// Decides whether `solid` touches the scan.
+pub(crate) fn touch(
+    elements: &Elements<'_>,
+    solid: Option<&Solid<'_>>,
+    (level, scratch): (Level, &mut ViewScratch),
+) -> ShapeAnswer {
+    let Some(solid) = solid else {
+        return ShapeAnswer { verdict: ShapeVerdict::Undecided(Reason::Shape), band: f64::INFINITY };
+    };
+    let detail = elements.plan.options().detail;
+    let mut near = Near::new(elements, solid, elements.certifies);
+    near.limit(elements.margin);
+    let (met, certified) = ([None; TRIES], None);
+    let mut search = Touch { near, detail, met, count: 0, certified, undersampled: false, doubtful: false };
+    let centre = search.near.lane_box.centre;
+    // An early end means that the question is settled.
+    let _settled = elements.arrays.tree.descend_to(level, centre, &mut search);
+    let touching = |met: Met, point, evidence| ShapeAnswer {
+        verdict: ShapeVerdict::Touching { point, source: elements.placed.scan().id(met.i), evidence },
+        band: elements.band(met.i),
+    };
+    if let Some(met) = search.certified {
+        return touching(met, elements.in_world(&met.point), Evidence::Certified);
+    }
+    if let Some(first) = search.met[0] {
+        if detail == Detail::Witness {
+            for met in search.met.iter().flatten() {
+                if let Some(point) = verified_in(elements, solid, (met.i, met.point), scratch) {
+                    return touching(*met, point, Evidence::Certified);
+                }
+            }
+        }
+        return touching(first, elements.in_world(&first.point), Evidence::Estimated);
+    }
+    let verdict = if search.undersampled {
+        ShapeVerdict::Undecided(Reason::Undersampled)
+    } else {
+        ShapeVerdict::Separated { evidence: elements.of_separation(search.doubtful) }
+    };
+    ShapeAnswer { verdict, band: elements.greatest_band() }
+}
+
+impl Touch<'_, '_> {
+    /// Compares the shape with the part of a point.
+    fn compare(&mut self, i: usize) -> ControlFlow<()> {
+        let Near { elements, solid, .. } = self.near;
+        let (gap, thick) = elements.gap(solid, i, elements.margin);
+        if gap.distance > solid.radius + elements.margin.max(thick) {
+            return ControlFlow::Continue(());
+        }
+        if elements.is_doubtful(i) {
+            self.undersampled = true;
+            return ControlFlow::Continue(());
+        }
+        let met = Met { i, point: gap.on_disc };
+        if !elements.is_disc(i) {
+            self.certified = Some(met);
+            return ControlFlow::Break(());
+        }
+        if self.count < TRIES {
+            self.met[self.count] = Some(met);
+            self.count += 1;
+        }
+        if self.detail == Detail::Verdict {
+            return ControlFlow::Break(());
+        }
+        // A measured point is part of the obstacle.
+        let p = elements.position(i);
+        if elements.semantics == Semantics::Obstacle && solid.distance(&p) <= solid.radius + elements.margin {
+            self.certified = Some(Met { i, point: p });
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl PlaceVisitor for Touch<'_, '_> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.near.most_sq
+    }
+
+    #[inline(always)]
+    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
+        self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        let elements = self.near.elements;
+        if elements.certifies && elements.semantics == Semantics::Surface {
+            self.doubtful = true;
+        }
+        for (block, first, count) in elements.arrays.leaves.blocks(number) {
+            let gaps = elements.leaf_gaps(simd, &self.near.lane_box, (number, block, first, count));
+            for lane in Bits(Elements::within(simd, (&gaps.elements, count), self.near.most)) {
+                self.compare(first + lane)?;
+            }
+            if elements.certifies
+                && elements.semantics == Semantics::Obstacle
+                && !self.doubtful
+                && self.count == 0
+            {
+                let within = elements.margin + self.near.solid.radius;
+                for lane in Bits(Elements::within(simd, (&gaps.cells, count), self.near.most)) {
+                    let gap = elements.cell_gap(self.near.solid, first + lane);
+                    self.doubtful |= gap.is_nan() || gap <= within;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,200 @@
+//! A placed scan as the target of convex shapes and rays.
+
+use crate::ask::answer::{Evidence, Reason};
+use crate::pair::placed::Placed;
+use crate::pair::placed_balls::is_proper;
+use crate::question::Scratch;
+use crate::solid::answer::{ShapeAnswer, ShapeContact, ShapeDistance, ShapeVerdict};
+use crate::solid::cast::{Wanted, crossings, next_hit};
+use crate::solid::contacts::contacts;
+use crate::solid::core::Solid;
+use crate::solid::distance::distance;
+use crate::solid::elements::Elements;
+use crate::solid::hint::ShapeHint;
+use crate::solid::plan::ShapePlan;
+use crate::solid::ray::{Ray, RayAnswer, RayHit, StoredRay};
+use crate::solid::shape::Shape;
+use crate::solid::touch::touch;
+
+/// A placed scan, with the meaning of a plan, as the target of convex [shapes](Shape) and
+/// [rays](Ray).
+///
+/// The scan is its obstacle (`docs/theory/obstacle.md`) unless the plan says otherwise: tangent discs
+/// where points sample a sheet, balls elsewhere. [`Placed::touches`] and [`Placed::nearest`] ask about
+/// the points alone. Make a target once for each pose of a scan; it takes about 100 ns.
+///
+/// Nothing allocates once `scratch` and the outputs are warm. Deterministic.
+///
+/// ```
+/// use nearmiss_geometry::{PointCloud, Pose};
+/// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+/// use nearmiss_query::{CollideOptions, Prepared, Ray, Scratch, Shape, ShapePlan, Target};
+///
+/// // A scanned floor, and a ball on it.
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let floor = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let plan = ShapePlan::new(&CollideOptions::default(), &floor)?;
+/// let target = Target::new(floor.at(&Pose::IDENTITY), &plan);
+/// let mut scratch = Scratch::default();
+///
+/// let ball = Shape::Sphere { centre: [0.503, 0.497, 0.099], radius: 0.1 };
+/// assert!(target.touch(&ball, &mut scratch).verdict.is_touching());
+/// let mut contacts = Vec::new();
+/// target.contacts(&ball, &mut contacts, &mut scratch);
+/// assert!((contacts[0].depth - 0.001).abs() < 1e-6 && contacts[0].normal[2] > 0.999);
+///
+/// let above = Shape::Sphere { centre: [0.5, 0.5, 0.4], radius: 0.1 };
+/// let distance = target.distance(&above, f64::INFINITY, &mut scratch).expect("within reach");
+/// assert!(distance.lower > 0.28 && (distance.upper - 0.3).abs() < 1e-6);
+///
+/// let down = Ray::new([0.2, 0.3, 1.0], [0.0, 0.0, -2.0]);
+/// let hit = target.cast(&down, &mut scratch).hit.expect("the floor");
+/// assert!((hit.t - 1.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Target<'a> {
+    elements: Elements<'a>,
+    is_proper: bool,
+}
+
+impl<'a> Target<'a> {
+    /// A target with the meaning of `plan`.
+    #[must_use]
+    pub fn new(scan: Placed<'a>, plan: &ShapePlan) -> Self {
+        Self { elements: Elements::new(scan, plan), is_proper: is_proper(scan.stored_to_world()) }
+    }
+
+    /// The scan.
+    #[must_use]
+    pub fn scan(&self) -> &Placed<'a> {
+        &self.elements.placed
+    }
+
+    /// Decides whether a shape touches the scan, or is within the margin of it.
+    ///
+    /// A shape touches a disc within 1/20 of the disc's radius, as it does as a mesh
+    /// ([`MeshScanPair`](crate::MeshScanPair)). The scan is two-sided and open: a shape behind the
+    /// surface, or inside a closed one, does not touch it. Contacts are certified by a measured point in
+    /// the shape, by a ball, or, with [`Detail::Witness`](crate::Detail), by a point of the surface in
+    /// the shape. Separations are certified by enclosures and by the volumes about points that contain
+    /// the obstacle (`docs/theory/shapes.md`).
+    ///
+    /// Costs O(log n) for a shape of a few local radii, and in proportion to the leaves near larger ones.
+    #[must_use]
+    pub fn touch(&self, shape: &Shape<'_>, scratch: &mut Scratch) -> ShapeAnswer {
+        if !self.is_proper {
+            let verdict = ShapeVerdict::Undecided(Reason::Pose);
+            return ShapeAnswer { verdict, band: f64::INFINITY };
+        }
+        let level = scratch.level();
+        touch(&self.elements, self.solid(shape).as_ref(), (level, &mut scratch.contact.gathers[0]))
+    }
+
+    /// Bounds the distance of a shape and the scan: lower ≤ distance ≤ upper. `None` if the nearest disc
+    /// or ball is further away than `within`, or if the shape or the pose is invalid.
+    ///
+    /// The upper bound is exact for the nearest disc or ball. The lower bound, which is proven, is at
+    /// most about 0.3 local radii less before a sheet. Points about which nothing is known do not count
+    /// with [`Semantics::Surface`](crate::Semantics).
+    #[must_use]
+    pub fn distance(&self, shape: &Shape<'_>, within: f64, scratch: &mut Scratch) -> Option<ShapeDistance> {
+        let solid = self.solid(shape).filter(|_| self.is_proper);
+        distance(&self.elements, solid.as_ref(), within, scratch.level())
+    }
+
+    /// Writes up to eight contacts of a shape with the scan to `out`, the deepest first, then always the
+    /// one furthest from all previous ones. With a margin, gaps within it are contacts of negative depth.
+    /// Leaves `out` empty if there are none.
+    ///
+    /// The normal of a disc points outwards if the scan is oriented, otherwise to the side of the
+    /// shape's centre. If some contacts are before their surface and others behind theirs, as at a thin
+    /// plate, those behind are left out. With [`Detail::Witness`](crate::Detail) each contact is moved
+    /// onto the surface by one evaluation of the implicit function.
+    pub fn contacts(&self, shape: &Shape<'_>, out: &mut Vec<ShapeContact>, scratch: &mut Scratch) {
+        self.gather(shape, None, out, scratch);
+    }
+
+    /// Like [`Self::contacts`], with contacts that continue those of the last frame: they keep their
+    /// ids, are preferred to others of equal depth, and keep the side of surfaces that are not oriented.
+    pub fn contacts_hinted(
+        &self,
+        shape: &Shape<'_>,
+        hint: &mut ShapeHint,
+        out: &mut Vec<ShapeContact>,
+        scratch: &mut Scratch,
+    ) {
+        self.gather(shape, Some(hint), out, scratch);
+    }
+
+    /// Finds the first place where a ray, or a ball that moves along it, hits the scan.
+    ///
+    /// Between discs, the surface continues in the cells of points that sample the inside of a sheet, so
+    /// a ray does not pass between them. With [`Detail::Witness`](crate::Detail) a hit is moved to
+    /// where the implicit function vanishes, which certifies it.
+    #[must_use]
+    pub fn cast(&self, ray: &Ray, scratch: &mut Scratch) -> RayAnswer {
+        let none = RayAnswer { hit: None, evidence: Evidence::Estimated };
+        let Some(stored) = self.ray(ray) else { return none };
+        let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
+        let found = &mut solid.crossings;
+        let evidence = crossings(&self.elements, &stored, Wanted::First, (level, &mut *found));
+        let hit = next_hit(&self.elements, &stored, found, &mut 0, &mut contact.gathers[0]);
+        let hit = hit.map(|(hit, _)| hit);
+        RayAnswer { hit, evidence: hit.map_or(evidence, |hit| hit.evidence) }
+    }
+
+    /// Returns `true` if a ray hits anything, which is faster than finding the first place.
+    #[must_use]
+    pub fn is_hit(&self, ray: &Ray, scratch: &mut Scratch) -> bool {
+        let Some(stored) = self.ray(ray) else { return false };
+        let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
+        let found = &mut solid.crossings;
+        // Without a disc or ball, a hole between discs may still hold surface.
+        let _evidence = crossings(&self.elements, &stored, Wanted::Any, (level, &mut *found));
+        found.iter().any(|it| it.is_sure())
+            || next_hit(&self.elements, &stored, found, &mut 0, &mut contact.gathers[0]).is_some()
+    }
+
+    /// Writes all places where a ray hits the scan to `out`, the nearest first: one for each sheet that
+    /// it crosses, and for each ball. Of places nearer to each other than 0.3 local radii the first
+    /// counts.
+    pub fn cast_all(&self, ray: &Ray, out: &mut Vec<RayHit>, scratch: &mut Scratch) {
+        out.clear();
+        let Some(stored) = self.ray(ray) else { return };
+        let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
+        let found = &mut solid.crossings;
+        let _evidence = crossings(&self.elements, &stored, Wanted::All, (level, &mut *found));
+        let mut next = 0;
+        while let Some((hit, layer)) =
+            next_hit(&self.elements, &stored, found, &mut next, &mut contact.gathers[0])
+        {
+            // Crossings of one sheet may end at the same place once they are moved onto the surface.
+            if out.last().is_none_or(|last| hit.t - last.t > layer) {
+                out.push(hit);
+            }
+        }
+    }
+
+    fn solid<'s>(&'s self, shape: &Shape<'s>) -> Option<Solid<'s>> {
+        Solid::new(shape, self.elements.placed.stored_to_world())
+    }
+
+    fn ray(&self, ray: &Ray) -> Option<StoredRay> {
+        StoredRay::new(ray, self.elements.placed.stored_to_world()).filter(|_| self.is_proper)
+    }
+
+    fn gather(
+        &self,
+        shape: &Shape<'_>,
+        hint: Option<&mut ShapeHint>,
+        out: &mut Vec<ShapeContact>,
+        scratch: &mut Scratch,
+    ) {
+        let shape = self.solid(shape).filter(|_| self.is_proper);
+        let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
+        let working = (level, &mut contact.gathers[0], &mut solid.candidates);
+        contacts(&self.elements, shape.as_ref(), hint, out, working);
+    }
+}
