@@ -53,19 +53,21 @@ fn now() -> Instant {
     Instant::now()
 }
 
-/// Runs a program of the workspace with these arguments.
-fn run_program(package: &str, program: &str, words: &[&str]) -> Outcome {
-    run_cargo(&[&["run", "--release", "--quiet", "-p", package, "--bin", program, "--"], words].concat())
+/// Builds and runs a release program, which `package` chooses, with these arguments.
+fn run_program(package: &[&str], words: &[&str]) -> Outcome {
+    run_cargo(&[&["run", "--release", "--quiet"], package, &["--"], words].concat())
 }
 
 /// Checks the output of `collide --prove` with these arguments of `check-proof`.
 pub(crate) fn check_proof(words: &[&str]) -> Outcome {
-    run_program("check-proof", "check-proof", words)
+    run_program(&["-p", "check-proof"], words)
 }
 
 /// Verifies answers, counts and shapes with known answers; then the proofs of a scan near itself.
 fn verify() -> Outcome {
-    run_program("nearmiss-benches", "verify", &["--quick"])?;
+    // Without rivals that take long to compile.
+    let package = ["-p", "nearmiss-benches", "--no-default-features", "--bin", "verify"];
+    run_program(&package, &["--quick"])?;
     let folder = root().join("target").join("proofs");
     std::fs::create_dir_all(&folder)?;
     let path = |name: &str| folder.join(name).to_string_lossy().into_owned();
@@ -91,14 +93,15 @@ fn docs() -> Outcome {
     crate::repository::run(&mut command, "cargo doc")
 }
 
-/// Lints each crate alone, with its default features and with none.
+/// Lints each crate alone and without features; then the one that users add, with its default ones.
+/// The lints of the workspace see all features.
 fn features() -> Outcome {
     for member in members()?.iter().filter(|member| member.published) {
-        for features in [&["--quiet"][..], &["--quiet", "--no-default-features"]] {
-            run_cargo(&[&["clippy", "-p", &member.name], features, &["--", "-D", "warnings"]].concat())?;
-        }
+        let alone =
+            ["clippy", "-p", &member.name, "--quiet", "--no-default-features", "--", "-D", "warnings"];
+        run_cargo(&alone)?;
     }
-    Ok(())
+    run_cargo(&["clippy", "-p", "nearmiss", "--quiet", "--", "-D", "warnings"])
 }
 
 /// Checks that one thread and two, a debug and a release build (that of the tests, and this
