@@ -415,6 +415,15 @@ const FARTHEST: f64 = 1e100;
 /// then differ by at most the 2⁶⁰ that single queries allow.
 const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
 
+impl Placed<'_> {
+    /// Returns a bounding box, in the world, of all that a query compares: discs and balls of the scan,
+    /// and the surface between them. `None` if the pose is invalid or out of range.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Aabb> {
+        bounds(self)
+    }
+}
+
 /// The world-space bounding box of all parts of a scan that a query compares, enlarged by half of
 /// the rounding error that the query allows for. `None` if the pose is invalid or out of range.
 fn bounds(view: &Placed<'_>) -> Option<Aabb> {

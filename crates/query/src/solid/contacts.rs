@@ -55,6 +55,8 @@ pub(crate) struct Candidate {
 struct Gather<'s, 'a> {
     near: Near<'s, 'a>,
     hint: Option<&'s ShapeHint>,
+    /// The point whose side of a surface is that of the shape, in the stored frame.
+    inside: Vector,
     is_oriented: bool,
     found: &'s mut Vec<Candidate>,
 }
@@ -74,7 +76,10 @@ pub(crate) fn contacts(
         near.limit(elements.margin);
         let centre = near.lane_box.centre;
         let is_oriented = elements.placed.scan().is_oriented();
-        let mut search = Gather { near, hint: hint.as_deref(), is_oriented, found };
+        let own = hint.as_deref().and_then(|hint| hint.centre);
+        let inside =
+            own.map_or(solid.inside, |own| elements.placed.stored_to_world().apply_inverse(own).into());
+        let mut search = Gather { near, hint: hint.as_deref(), inside, is_oriented, found };
         // The visitor never breaks.
         let _whole = elements.arrays.tree.descend_to(level, centre, &mut search);
     }
@@ -209,7 +214,7 @@ impl Gather<'_, '_> {
             Element::Disc(disc) => {
                 let out = self.way_out(i, &disc);
                 let is_edge = elements.placed.scan().kind(i) == PointKind::Edge;
-                let is_behind = out.dot(&(solid.inside - disc.centre)) < 0.0;
+                let is_behind = out.dot(&(self.inside - disc.centre)) < 0.0;
                 of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)).map(|it| (it, is_behind))
             }
         };
@@ -226,7 +231,7 @@ impl Gather<'_, '_> {
     /// The normal of a disc, in the direction in which the shape moves out: outwards if the scan is
     /// oriented, otherwise as in the last frame, or to the side of the shape's centre.
     fn way_out(&self, i: usize, disc: &FlatDisc) -> Vector {
-        let Near { elements, solid, .. } = self.near;
+        let elements = self.near.elements;
         if self.is_oriented {
             return disc.normal;
         }
@@ -237,7 +242,7 @@ impl Gather<'_, '_> {
             Some(Vector::from(placed.rotate_inverse(side.into())))
         });
         known.unwrap_or_else(|| {
-            let side = disc.normal.dot(&(solid.inside - disc.centre));
+            let side = disc.normal.dot(&(self.inside - disc.centre));
             disc.normal * 1.0_f64.copysign(side)
         })
     }

@@ -24,12 +24,20 @@ pub struct ShapeHint {
     contacts: [Option<ShapeContact>; MOST],
     /// The number of ids given so far.
     counted: u64,
+    /// The point whose side of a surface counts instead of the shape's centre.
+    pub(crate) centre: Option<[f64; 3]>,
 }
 
 impl ShapeHint {
     /// Forgets all contacts: the shape was moved elsewhere.
     pub fn clear(&mut self) {
         self.contacts = [None; MOST];
+    }
+
+    /// Sets the point of the world whose side of a surface counts instead of the shape's centre, for
+    /// example the centre of a body of which the shape is a part. `None` is the shape's centre.
+    pub fn set_centre(&mut self, centre: Option<[f64; 3]>) {
+        self.centre = centre;
     }
 
     /// The contacts of the last frame.
