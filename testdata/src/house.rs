@@ -55,7 +55,8 @@ pub struct Quad {
 
 impl Quad {
     /// Returns the point with these shares of the sides.
-    fn at(&self, [s, t]: [f64; 2]) -> [f64; 3] {
+    #[must_use]
+    pub fn at(&self, [s, t]: [f64; 2]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.corner[k] + s * self.sides[0][k] + t * self.sides[1][k])
     }
 

@@ -1,6 +1,11 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+/// The example of the guide compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/rapier.md")]
+struct Guide;
+
 mod convert;
 mod dispatcher;
 mod manifolds;

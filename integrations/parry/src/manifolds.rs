@@ -11,7 +11,7 @@ use nearmiss::{ManifoldPoint, PairHint, ShapeContact, ShapeHint};
 
 use crate::convert::{from_pose, to_real, to_vector};
 
-/// What the contacts of one step pass on to the next, for a pair of shapes.
+/// The state that the contacts of one step pass on to the next, for a pair of shapes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Kept {
     /// By the part of the other shape, with the number of the last step in which it was near.
@@ -67,7 +67,7 @@ pub(crate) struct Touch {
     /// Away from the scan.
     pub(crate) normal: [f64; 3],
     pub(crate) gap: f64,
-    /// What the contact keeps from step to step.
+    /// The id, which the contact keeps from step to step.
     id: u32,
 }
 

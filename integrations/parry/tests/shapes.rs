@@ -70,7 +70,7 @@ fn shapes() -> Vec<(SharedShape, f32)> {
     ]
 }
 
-fn dispatcher() -> impl QueryDispatcher + PersistentQueryDispatcher {
+fn dispatcher() -> impl PersistentQueryDispatcher {
     ScanDispatcher.chain(DefaultQueryDispatcher)
 }
 

@@ -1,0 +1,160 @@
+//! Two hundred bodies fall onto a scan: `cargo run --release -p nearmiss-parry --example drop -- SCAN.nm
+//! [PICTURE.png]`. The scan is in metres, z up. Without one, the scan is that of a small house.
+//!
+//! Prints energy, depths and the time of a step; draws the scene after 0, 0.5, 2 and 10 seconds.
+
+mod picture;
+mod world;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::time::Instant;
+
+use nearmiss::geometry::PointCloud;
+use nearmiss::store::Check;
+use nearmiss::{BuildOptions, Pose, Ray, Scan, Scratch, Shape, ShapePlan, Target};
+use nearmiss_parry::ScanShape;
+use nearmiss_testdata::house::{Quad, house, scanned};
+use rand::RngExt as _;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng as _;
+use rapier3d::math::Vector;
+use rapier3d::parry::shape::{SharedShape, TriMesh};
+use world::Drop;
+
+type Failure = Box<dyn std::error::Error>;
+
+/// The distance of neighbouring points of the house.
+const SPACING: f64 = 0.05;
+
+/// The steps after which the scene is drawn, sixty a second.
+const SHOWN: [u32; 4] = [0, 30, 120, 600];
+
+fn main() -> Result<(), Failure> {
+    let mut words = std::env::args().skip(1);
+    let quads = house();
+    let path = words.next();
+    let scan = match &path {
+        Some(path) => Scan::open(path, Check::Full)?,
+        None => {
+            let cloud = PointCloud::from_positions(&scanned(&quads, SPACING, 0.0, 7))?;
+            Scan::build(&cloud, &BuildOptions::default())?
+        }
+    };
+    let places = places(&scan, 200)?;
+    println!("{} points, {} bodies, sampling radius {:.3}", scan.len(), places.len(), scan.sampling_radius());
+    let strip = fall(&scan, ScanShape::new(scan.clone())?.shared(), &places)?;
+    if path.is_none() {
+        let exact = mesh(&quads)?;
+        println!("the same on a mesh of {} triangles", exact.indices().len());
+        fall(&scan, SharedShape::new(exact), &places)?;
+    }
+    if let Some(path) = words.next() {
+        let picture = picture::strip(&scan, &strip);
+        picture.encode(BufWriter::new(File::create(path)?))?;
+    }
+    Ok(())
+}
+
+/// A triangle mesh of surfaces, two triangles for each square of the spacing of points.
+fn mesh(quads: &[Quad]) -> Result<TriMesh, Failure> {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for quad in quads {
+        let [columns, rows] = quad.sides.map(|side| {
+            let length = side.iter().map(|c| c * c).sum::<f64>().sqrt();
+            (1_u32..).find(|&n| f64::from(n) * SPACING >= length).unwrap_or(1)
+        });
+        let first = u32::try_from(vertices.len())?;
+        for (row, column) in (0..=rows).flat_map(|row| (0..=columns).map(move |column| (row, column))) {
+            let at = quad.at([f64::from(column) / f64::from(columns), f64::from(row) / f64::from(rows)]);
+            vertices.push(Vector::from_array(single(at)));
+        }
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let [low, high] = [0, 1].map(|up| first + (row + up) * (columns + 1) + column);
+            triangles.extend([[low, low + 1, high + 1], [low, high + 1, high]]);
+        }
+    }
+    Ok(TriMesh::new(vertices, triangles)?)
+}
+
+/// Lets bodies fall for ten seconds, and prints what becomes of them. Returns where they are when they
+/// are drawn.
+fn fall(scan: &Scan, ground: SharedShape, places: &[[f32; 3]]) -> Result<Vec<(f64, Vec<Vector>)>, Failure> {
+    let mut drop = Drop::new(ground, places, 11);
+    println!("seconds, kinetic J, kinetic and potential J, deepest contact, fastest, lost, ms a step");
+    let mut strip = Vec::new();
+    let mut took = 0.0;
+    for step in 0..=600 {
+        if SHOWN.contains(&step) {
+            strip.push((f64::from(step) / 60.0, drop.positions()));
+        }
+        if step % 60 == 0 {
+            let [kinetic, potential] = drop.energy();
+            let fastest = drop.speeds().into_iter().fold(0.0, f32::max);
+            let lost = lost(scan, &drop)?;
+            let (second, total, mean) = (step / 60, kinetic + potential, took / 60.0);
+            let deepest = drop.deepest();
+            println!("{second}, {kinetic:.4}, {total:.1}, {deepest:.4}, {fastest:.4}, {lost}, {mean:.2}");
+            took = 0.0;
+        }
+        let clock = Instant::now();
+        drop.world.step();
+        took += clock.elapsed().as_secs_f64() * 1000.0;
+    }
+    Ok(strip)
+}
+
+/// Free places above points of the scan that look up, from a fixed seed.
+fn places(scan: &Scan, count: usize) -> Result<Vec<[f32; 3]>, Failure> {
+    let plan = ShapePlan::new(&nearmiss::CollideOptions::estimated(), scan)?;
+    let target = Target::new(scan.at(&Pose::IDENTITY), &plan);
+    let (mut scratch, mut random) = (Scratch::default(), Xoshiro256PlusPlus::seed_from_u64(3));
+    let bounds = *scan.bounds();
+    let mut places: Vec<[f64; 3]> = Vec::new();
+    for _ in 0..1_000_000 {
+        if places.len() == count {
+            break;
+        }
+        let from = [0, 1, 2].map(|k| random.random_range(bounds.min[k]..bounds.max[k]));
+        let down = Ray::new(from, [0.0, 0.0, -1.0]).with_max(4.0);
+        let Some(hit) = target.cast(&down, &mut scratch).hit.filter(|hit| hit.normal[2] > 0.9) else {
+            continue;
+        };
+        let centre = [hit.point[0], hit.point[1], hit.point[2] + 0.5];
+        let is_apart = |p: &[f64; 3]| (0..3).any(|k| (p[k] - centre[k]).abs() > 0.5);
+        let room = Shape::Sphere { centre, radius: 0.35 };
+        // Not beside an edge or a hole of the floor.
+        let mut is_floor = |[x, y]: [f64; 2]| {
+            let from = [centre[0] + x, centre[1] + y, centre[2]];
+            target.is_hit(&Ray::new(from, [0.0, 0.0, -1.0]).with_max(0.8), &mut scratch)
+        };
+        if ![[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]]
+            .map(|d| d.map(|c| 0.6 * c))
+            .into_iter()
+            .all(&mut is_floor)
+        {
+            continue;
+        }
+        if places.iter().all(is_apart) && target.touch(&room, &mut scratch).verdict.is_separated() {
+            places.push(centre);
+        }
+    }
+    Ok(places.into_iter().map(single).collect())
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rapier computes in single precision")]
+fn single(place: [f64; 3]) -> [f32; 3] {
+    place.map(|c| c as f32)
+}
+
+/// The number of bodies with nothing of the scan within half a metre below.
+fn lost(scan: &Scan, drop: &Drop) -> Result<usize, Failure> {
+    let plan = ShapePlan::new(&nearmiss::CollideOptions::estimated(), scan)?;
+    let target = Target::new(scan.at(&Pose::IDENTITY), &plan);
+    let mut scratch = Scratch::default();
+    let mut is_lost = |place: &Vector| {
+        let below = Shape::Sphere { centre: place.to_array().map(f64::from), radius: 0.5 };
+        target.touch(&below, &mut scratch).verdict.is_separated()
+    };
+    Ok(drop.positions().iter().map(|place| usize::from(is_lost(place))).sum())
+}
