@@ -114,7 +114,7 @@ fn triangles_without_area_are_segments_and_points() {
 fn other_numbers_do_not_panic() {
     let rng = &mut random(5);
     let others = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -0.0];
-    for _ in 0..20_000 {
+    for _ in 0..4000 {
         let mut pair = lattice_pair(rng);
         for _ in 0..rand::RngExt::random_range(rng, 1..4) {
             let [t, i, k] = [2, 3, 3].map(|n| rand::RngExt::random_range(rng, 0..n));
