@@ -3,7 +3,7 @@
 use nearmiss::{Evidence, Reason, Verdict};
 use pyo3::prelude::*;
 
-use crate::codes::{NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, number, plain, reason_code, reason_name, shown, undecided, vector};
+use crate::codes::{NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, verdict_name, number, plain, reason_code, reason_name, shown, undecided, vector};
 use crate::record::record;
 
 record! {
@@ -72,7 +72,7 @@ impl AnswerRecord {
 answer! {
     /// The answer of `Scan.collide`.
     Answer of AnswerRecord by answer_in_words {
-        verdict: Option<bool> = is_touching,
+        @verdict touches: ["separated", "intersecting"],
         evidence: Option<&'static str> = evidence_name,
         reason: Option<&'static str> = reason_name,
         witness: Option<[f64; 3]> = vector,

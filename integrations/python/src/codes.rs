@@ -50,7 +50,16 @@ pub(crate) fn reason_name(code: i8) -> Option<&'static str> {
     usize::try_from(code).ok()?.checked_sub(1).and_then(|i| REASONS.get(i)).copied()
 }
 
-/// Returns the verdict as a number: `Some(true)` for touching, `None` for undecided.
+/// Returns the verdict in a word. `names` are the words for apart and touching.
+pub(crate) const fn verdict_name(code: i8, names: [&'static str; 2]) -> &'static str {
+    match code {
+        0 => names[0],
+        1 => names[1],
+        _ => "undecided",
+    }
+}
+
+/// Returns the verdict as a truth value: `Some(true)` for touching, `None` for undecided.
 pub(crate) const fn is_touching(code: i8) -> Option<bool> {
     match code {
         1 => Some(true),
@@ -77,6 +86,7 @@ pub(crate) const NOWHERE: [f64; 3] = [NONE; 3];
 /// Defines a class over a record: a property for each field, and a representation.
 macro_rules! answer {
     ($(#[$about:meta])* $class:ident of $record:ident by $repr:ident {
+        $(@verdict $touches:ident: $names:expr,)?
         $($field:ident: $of:ty = $read:expr),* $(,)?
     }) => {
         $(#[$about])*
@@ -86,6 +96,20 @@ macro_rules! answer {
 
         #[pymethods]
         impl $class {
+            $(
+                /// The verdict in a word.
+                #[getter]
+                fn verdict(&self) -> &'static str {
+                    verdict_name(self.0.verdict, $names)
+                }
+
+                /// True, False, or None if the question is undecided.
+                #[getter]
+                fn $touches(&self) -> Option<bool> {
+                    is_touching(self.0.verdict)
+                }
+            )?
+
             $(
                 #[getter]
                 fn $field(&self) -> $of {

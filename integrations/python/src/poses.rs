@@ -31,6 +31,7 @@ impl<'py> Poses<'py> {
         let Some(given) = given else { return Ok(Self::One(IDENTITY)) };
         if let Ok(array) = given.extract::<PyReadonlyArrayDyn<'py, f64>>()
             && array.is_c_contiguous()
+            && array.shape().ends_with(&[4, 4])
         {
             return Self::of(array, given);
         }

@@ -3,7 +3,7 @@
 use nearmiss::ShapeVerdict;
 use pyo3::prelude::*;
 
-use crate::codes::{NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, number, plain, reason_code, reason_name, shown, undecided, vector};
+use crate::codes::{NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, verdict_name, number, plain, reason_code, reason_name, shown, undecided, vector};
 use crate::record::record;
 
 record! {
@@ -39,7 +39,7 @@ impl ShapeRecord {
 answer! {
     /// The answer of `Scan.touch`.
     ShapeAnswer of ShapeRecord by touch_in_words {
-        verdict: Option<bool> = is_touching,
+        @verdict touches: ["separated", "touching"],
         evidence: Option<&'static str> = evidence_name,
         reason: Option<&'static str> = reason_name,
         point: Option<[f64; 3]> = vector,

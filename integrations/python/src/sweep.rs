@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::codes::{
-    NONE, NOWHERE, answer, evidence_code, evidence_name, is_touching, number, plain, reason_name, shown,
+    NONE, NOWHERE, answer, evidence_code, evidence_name, is_touching, verdict_name, number, plain, reason_name, shown,
     sweep_reason_code, undecided, vector,
 };
 use crate::failure::refused;
@@ -101,7 +101,7 @@ impl SweepRecord {
 answer! {
     /// The answer of `sweep`.
     SweepAnswer of SweepRecord by sweep_in_words {
-        verdict: Option<bool> = is_touching,
+        @verdict hits: ["free", "impact"],
         evidence: Option<&'static str> = evidence_name,
         reason: Option<&'static str> = reason_name,
         t_free: f64 = plain,

@@ -48,7 +48,7 @@ def contact(
         axes = pyplot.figure().add_subplot(projection="3d")
     if answer is None:
         answer = a.collide(b, pose, own_pose)
-        if answer.verdict is not True:
+        if not answer.touches:
             answer = a.distance(b, pose, own_pose)
     for scan, placed, colour in ((a, own_pose, "tab:blue"), (b, pose, "tab:orange")):
         axes.scatter(*_placed(scan, placed).T, s=0.3, color=colour, alpha=0.4, linewidths=0)
