@@ -53,7 +53,7 @@ class Memory(unittest.TestCase):
                 nearmiss.Scan.from_bytes(small.to_bytes())
                 small.collide_each(small, pose[None])
 
-        for work, count in ((ask, 5 * ROUNDS), (build, ROUNDS // 4)):
+        for work, count in ((ask, 5 * ROUNDS), (build, ROUNDS)):
             work(count // 5 + 100)
             gc.collect()
             tracemalloc.start()

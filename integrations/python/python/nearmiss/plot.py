@@ -51,7 +51,9 @@ def contact(
         if not answer.touches:
             answer = a.distance(b, pose, own_pose)
     for scan, placed, colour in ((a, own_pose, "tab:blue"), (b, pose, "tab:orange")):
-        axes.scatter(*_placed(scan, placed).T, s=0.3, color=colour, alpha=0.4, linewidths=0)
+        points = _placed(scan, placed)
+        size = min(4.0, max(0.5, 2e4 / len(points)))
+        axes.scatter(*points.T, s=size, color=colour, alpha=0.6, linewidths=0)
     if isinstance(answer, Answer):
         if answer.witness is not None:
             axes.scatter(*answer.witness, color="red", s=40)
