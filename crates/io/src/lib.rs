@@ -19,6 +19,7 @@ mod obj;
 mod off;
 mod pcd;
 mod ply;
+mod point_cloud2;
 mod stl;
 mod xyz;
 
@@ -41,6 +42,7 @@ pub use format::{Format, UnknownFormatName};
 pub use glance::{Glance, glance};
 pub use out::{OutError, OutputFormat, PointWriter, ScaleOffset, Survey, UnknownOutputFormat};
 pub use pieces::{Pieces, PointPieces, read_in_pieces, read_watched};
+pub use point_cloud2::{Invalid, PointCloud2, PointCloud2Error, PointCloud2View, PointColumn, PointField};
 pub use points::Points;
 pub use read::{format_of, read, read_bytes, read_mesh, read_mesh_bytes};
 pub use sink::Model;

@@ -5,6 +5,7 @@ mod expansion;
 mod glances;
 mod mutations;
 mod pieces;
+mod point_cloud2;
 mod real_data;
 mod round_trips;
 mod writing;

@@ -1,0 +1,261 @@
+/* Every question has the answer that is known for a plate. C11. */
+#include "check.h"
+
+#include <math.h>
+
+static NearmissScan *plate;
+static NearmissPlan *plan;
+static NearmissScratch *scratch;
+
+static NearmissPlaced at(double x, double y, double z) {
+    NearmissPlaced placed = {plate, nearmiss_pose_identity()};
+    placed.pose.translation[0] = x;
+    placed.pose.translation[1] = y;
+    placed.pose.translation[2] = z;
+    return placed;
+}
+
+/* The plate turned upright about x, at this place. */
+static NearmissPlaced upright(double x, double y, double z) {
+    NearmissPlaced placed = at(x, y, z);
+    placed.pose.rotation[0] = placed.pose.rotation[3] = 1.0;
+    return placed;
+}
+
+static void pairs(void) {
+    NearmissPlaced low = at(0, 0, 0), high = at(0, 0, 0.3), cross = upright(0.1, 0.51, -0.4);
+    NearmissAnswer answer;
+    OK(nearmiss_collide(plan, &low, &high, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED && answer.evidence == NEARMISS_EVIDENCE_CERTIFIED);
+    CHECK(answer.gap > 0.0 && answer.gap <= 0.3 && isnan(answer.witness[0]) && answer.source_a == UINT32_MAX);
+    OK(nearmiss_collide(plan, &low, &cross, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && fabs(answer.witness[2]) < 1e-6);
+    CHECK(fabs(answer.witness[1] - 0.51) < 1e-6 && answer.source_a < PLATE && answer.reason == NEARMISS_REASON_NONE);
+
+    NearmissHint *hint;
+    OK(nearmiss_hint_new(&hint));
+    for (int step = 0; step < 40; step++) {
+        NearmissPlaced lowered = at(0, 0, 0.4 - 0.005 * step);
+        OK(nearmiss_collide(plan, &low, &lowered, NULL, hint, scratch, &answer));
+        CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED);
+    }
+    NearmissManifoldPoint points[8];
+    NearmissManifoldList manifold = {points, 8, 0};
+    OK(nearmiss_manifold(plan, &low, &cross, NULL, hint, scratch, &manifold, &answer));
+    CHECK(manifold.count >= 2 && manifold.count <= 8 && fabs(points[0].point[1] - 0.51) < 0.03);
+    manifold.capacity = 0;
+    manifold.points = NULL;
+    OK(nearmiss_manifold(plan, &low, &cross, NULL, NULL, scratch, &manifold, &answer));
+    CHECK(manifold.count >= 2);
+    OK(nearmiss_hint_free(hint));
+
+    NearmissContact some[2];
+    NearmissContactList contacts = {some, 2, 0, false};
+    OK(nearmiss_contacts(plan, &low, &cross, NULL, scratch, &contacts, &answer));
+    CHECK(contacts.complete && contacts.count > 2 && fabs(some[1].point[2]) < 0.02);
+
+    NearmissDistance distance;
+    OK(nearmiss_distance(plan, &low, &high, NULL, scratch, &distance));
+    CHECK(distance.lower <= 0.3 && fabs(distance.upper - 0.3) < 1e-6 && distance.complete);
+
+    NearmissBudget budget = nearmiss_unlimited();
+    budget.work = 1;
+    OK(nearmiss_collide(plan, &low, &cross, &budget, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_UNDECIDED && answer.reason == NEARMISS_REASON_BUDGET);
+    CHECK(answer.likelihood >= 0.0 && answer.likelihood <= 1.0);
+    budget.work = UINT64_MAX;
+    budget.seconds = 10.0;
+    OK(nearmiss_collide(plan, &low, &cross, &budget, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING);
+}
+
+static void shapes(void) {
+    NearmissPlaced floor = at(0, 0, 0);
+    NearmissPose above = at(0.5, 0.5, 0.2).pose, turned = upright(0.5, 0.5, 0.2).pose;
+    const double centre[3] = {0.5, 0.5, 0.2}, end[3] = {0.6, 0.5, 0.2};
+    const double a[3] = {0.5, 0.5, 0.1}, b[3] = {0.6, 0.5, 0.3}, c[3] = {0.5, 0.6, 0.3};
+    const double hull[12] = {0.5, 0.5, 0.1, 0.6, 0.5, 0.3, 0.5, 0.6, 0.3, 0.5, 0.5, 0.3};
+    NearmissShape all[7] = {
+        nearmiss_sphere(&centre, 0.1),      nearmiss_capsule(&centre, &end, 0.1),
+        nearmiss_box(above, 0.1, 0.1, 0.1), nearmiss_cylinder(turned, 0.1, 0.05),
+        nearmiss_cone(turned, 0.1, 0.05),   nearmiss_triangle(&a, &b, &c, 0.0),
+        nearmiss_hull(hull, 4, 0.0),
+    };
+    NearmissShapeAnswer answers[7];
+    NearmissShapeDistance distances[7];
+    OK(nearmiss_touch(plan, &floor, all, 7, scratch, answers));
+    OK(nearmiss_shape_distance(plan, &floor, all, 7, INFINITY, scratch, distances));
+    for (int i = 0; i < 7; i++) {
+        CHECK(answers[i].verdict == NEARMISS_VERDICT_SEPARATED);
+        CHECK(distances[i].lower <= 0.1 && fabs(distances[i].upper - 0.1) < 1e-6);
+    }
+    OK(nearmiss_shape_distance(plan, &floor, all, 1, 0.01, scratch, distances));
+    CHECK(isinf(distances[0].upper) && distances[0].source == UINT32_MAX);
+
+    NearmissShapeHint *hint;
+    OK(nearmiss_shape_hint_new(&hint));
+    uint64_t id = 0;
+    double height = 0.12;
+    for (int frame = 0; frame < 100; frame++) {
+        height -= 0.002;
+        const double place[3] = {0.5, 0.5, height};
+        NearmissShape ball = nearmiss_sphere(&place, 0.1);
+        NearmissShapeContact contacts[8];
+        size_t count;
+        OK(nearmiss_shape_contacts(plan, &floor, &ball, hint, scratch, contacts, 8, &count));
+        if (count > 0) {
+            CHECK(id == 0 || id == contacts[0].id);
+            id = contacts[0].id;
+            height += fmax(contacts[0].depth, 0.0) * contacts[0].normal[2];
+        }
+    }
+    CHECK(fabs(height - 0.1) < 1e-3);
+    OK(nearmiss_shape_hint_clear(hint));
+    OK(nearmiss_shape_hint_free(hint));
+}
+
+static void rays(void) {
+    NearmissPlaced floor = at(0, 0, 0);
+    NearmissRay down[3] = {
+        {{0.3, 0.3, 2.0}, {0, 0, -5}, INFINITY, 0},
+        {{0.3, 0.3, 2.0}, {0, 0, -1}, 1.0, 0},
+        {{0.3, 0.3, 2.0}, {0, 0, -1}, INFINITY, 0.1},
+    };
+    NearmissRayHit hits[3];
+    OK(nearmiss_cast(plan, &floor, down, 3, scratch, hits));
+    CHECK(hits[0].hit && fabs(hits[0].t - 2.0) < 1e-6 && fabs(hits[0].normal[2]) > 0.99);
+    CHECK(!hits[1].hit && isnan(hits[1].t));
+    CHECK(hits[2].hit && fabs(hits[2].t - 1.9) < 1e-6);
+    size_t count;
+    OK(nearmiss_cast_all(plan, &floor, &down[0], scratch, hits, 3, &count));
+    CHECK(count == 1);
+}
+
+static void motions(void) {
+    NearmissPose down[2] = {at(0, 0, 1).pose, upright(0.1, 0.5, -0.5).pose};
+    NearmissMotion *still, *moving;
+    NearmissPose origin = nearmiss_pose_identity();
+    OK(nearmiss_motion_new(&origin, 1, &still));
+    OK(nearmiss_motion_new(down, 2, &moving));
+    NearmissSweepAnswer answer;
+    OK(nearmiss_sweep(plan, plate, still, plate, moving, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && answer.t_free > 0 && answer.t_free <= answer.t_hit);
+    CHECK(answer.t_hit < 1);
+    OK(nearmiss_motion_free(moving));
+    down[1] = at(0, 0, 0.5).pose;
+    OK(nearmiss_motion_new(down, 2, &moving));
+    OK(nearmiss_sweep(plan, plate, still, plate, moving, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED && answer.t_free == 1.0 && answer.clearance > 0.3);
+    OK(nearmiss_motion_free(moving));
+    OK(nearmiss_motion_free(still));
+}
+
+static void worlds(void) {
+    NearmissWorld *world;
+    uint64_t ids[3];
+    NearmissPlaced low = at(0, 0, 0), cross = upright(0.1, 0.5, -0.4), far = at(9, 9, 9);
+    OK(nearmiss_world_new(&world));
+    OK(nearmiss_world_insert(world, &low, &ids[0]));
+    OK(nearmiss_world_insert(world, &cross, &ids[1]));
+    OK(nearmiss_world_insert(world, &far, &ids[2]));
+    NearmissBodyPair near[3];
+    size_t count;
+    OK(nearmiss_world_near_pairs(world, plan, NULL, 0, scratch, near, 3, &count));
+    CHECK(count == 1 && near[0].a == ids[0] && near[0].b == ids[1]);
+    NearmissAnswer answer;
+    OK(nearmiss_world_collide(world, plan, near[0], NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING);
+    OK(nearmiss_world_move(world, ids[1], &far.pose));
+    OK(nearmiss_world_near_pairs(world, plan, &ids[0], 1, scratch, near, 3, &count));
+    CHECK(count == 0);
+    OK(nearmiss_world_remove(world, ids[2]));
+    FAILS(nearmiss_world_remove(world, ids[2]), NEARMISS_STATUS_ARGUMENT, "id of a body");
+    FAILS(nearmiss_world_collide(world, plan, (NearmissBodyPair){0, 77}, NULL, NULL, scratch, &answer),
+          NEARMISS_STATUS_ARGUMENT, "got 77");
+    OK(nearmiss_world_free(world));
+}
+
+static void maps(void) {
+    enum { SIDE = 60, COUNT = SIDE * SIDE + 4 * SIDE * 40 };
+    double *points = malloc(3 * COUNT * sizeof *points), *p = points;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        *p++ = 0.1 * (i % SIDE), *p++ = 0.1 * (i / SIDE), *p++ = 0.0;
+    }
+    for (int i = 0; i < SIDE * 40; i++) {
+        const double along = 0.1 * (i % SIDE), h = 0.05 * (i / SIDE), last = 0.1 * (SIDE - 1);
+        const double walls[12] = {along, 0, h, along, last, h, 0, along, h, last, along, h};
+        memcpy(p, walls, sizeof walls);
+        p += 12;
+    }
+    NearmissMapOptions options = nearmiss_map_options();
+    options.pixel = 0.1;
+    options.up = "z";
+    NearmissSliceMap *map;
+    OK(nearmiss_map_from_points(points, COUNT, &options, &map));
+    const double min[3] = {1, 1, 0.5}, max[3] = {3, 3, 1.5}, wall[3] = {-0.1, 1, 0.5};
+    NearmissOccupancy found;
+    OK(nearmiss_map_query(map, &min, &max, &found));
+    CHECK(!found.collides && fabs(found.floor) < 0.05);
+    OK(nearmiss_map_query(map, &wall, &max, &found));
+    CHECK(found.collides);
+    FAILS(nearmiss_map_query(map, &max, &min, &found), NEARMISS_STATUS_ARGUMENT, "min ≤ max");
+
+    const double start[3] = {1, 1, 0}, goal[3] = {4, 4, 0}, outside[3] = {50, 1, 0}, ahead[2] = {3, 1};
+    double route[20], length;
+    size_t count;
+    OK(nearmiss_route(map, NULL, &start, &goal, route, 10, &count, &length));
+    CHECK(count >= 1 && length > 4.2 && length < 4.6);
+    FAILS(nearmiss_route(map, NULL, &start, &outside, route, 10, &count, &length), NEARMISS_STATUS_ARGUMENT, "goal");
+    NearmissWalker *walker;
+    NearmissStep step = {{0, 0, 0}, false, false};
+    OK(nearmiss_walker_new(map, NULL, &start, &walker));
+    for (int i = 0; i < 60; i++) {
+        OK(nearmiss_walker_step(walker, map, &ahead, &step));
+    }
+    CHECK(fabs(step.position[0] - 3) < 1e-9 && !step.blocked && !step.falling);
+    OK(nearmiss_walker_free(walker));
+    FAILS(nearmiss_walker_new(map, NULL, &outside, &walker), NEARMISS_STATUS_ARGUMENT, "nearest place to stand");
+    CHECK(walker == NULL);
+    OK(nearmiss_map_free(map));
+    options.up = "w";
+    FAILS(nearmiss_map_from_points(points, COUNT, &options, &map), NEARMISS_STATUS_ARGUMENT, "got `w`");
+    free(points);
+}
+
+static void messages(void) {
+    float data[4 * 12];
+    for (int i = 0; i < 12; i++) {
+        data[4 * i] = (float)(i % 4), data[4 * i + 1] = (float)(i / 4), data[4 * i + 2] = i == 5 ? NAN : 0.0f;
+        data[4 * i + 3] = 0;
+    }
+    NearmissMessageField fields[3] = {{"x", 0, 7, 1}, {"y", 4, 7, 1}, {"z", 8, 7, 1}};
+    NearmissMessage message = {3, 4, fields, 3, 0, 16, 64, (const uint8_t *)data, sizeof data};
+    NearmissScan *scan;
+    NearmissScanAbout about;
+    OK(nearmiss_scan_from_point_cloud2(&message, NULL, &scan));
+    OK(nearmiss_scan_about(scan, &about));
+    CHECK(about.points == 11 && about.not_finite == 1 && about.max[0] == 3.0);
+    OK(nearmiss_scan_free(scan));
+    message.data_length--;
+    FAILS(nearmiss_scan_from_point_cloud2(&message, NULL, &scan), NEARMISS_STATUS_ARGUMENT, "192 bytes");
+}
+
+int main(void) {
+    static double points[3 * PLATE];
+    fill_plate(points);
+    OK(nearmiss_scan_from_points(points, PLATE, NULL, &plate));
+    OK(nearmiss_plan_new(NULL, plate, plate, &plan));
+    OK(nearmiss_scratch_new(&scratch));
+    pairs();
+    shapes();
+    rays();
+    motions();
+    worlds();
+    maps();
+    messages();
+    OK(nearmiss_scratch_free(scratch));
+    OK(nearmiss_plan_free(plan));
+    OK(nearmiss_scan_free(plate));
+    puts("questions: ok");
+    return 0;
+}

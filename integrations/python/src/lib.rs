@@ -1,0 +1,50 @@
+//! The module `nearmiss._native` of the Python package `nearmiss`: classes over the crate
+//! `nearmiss`. Python code in `python/nearmiss` re-exports it; stubs document it.
+
+// Bottom up.
+mod pool;
+mod record;
+
+mod codes;
+mod failure;
+
+mod answers;
+mod arrays;
+mod options;
+mod poses;
+mod shape_answers;
+
+mod prepare;
+mod shape;
+
+mod cloud;
+mod hint;
+mod scan;
+mod slices;
+mod sweep;
+mod target;
+mod world;
+
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::answers::{Answer, Distance};
+    #[pymodule_export]
+    use super::cloud::{point_cloud2, read_points};
+    #[pymodule_export]
+    use super::hint::{Hint, ShapeHint};
+    #[pymodule_export]
+    use super::scan::Scan;
+    #[pymodule_export]
+    use super::shape::Shape;
+    #[pymodule_export]
+    use super::shape_answers::{RayAnswer, ShapeAnswer, ShapeDistance};
+    #[pymodule_export]
+    use super::slices::SliceMap;
+    #[pymodule_export]
+    use super::sweep::{SweepAnswer, sweep};
+    #[pymodule_export]
+    use super::target::Target;
+    #[pymodule_export]
+    use super::world::World;
+}

@@ -1,0 +1,114 @@
+//! Options of questions, given by name.
+
+use std::time::Duration;
+
+use nearmiss::{Budget, CollideOptions, Deadline, Detail, Evidence, Metric, Scan, Semantics};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+
+use crate::failure::refused;
+
+/// The options of a question, read from keywords.
+pub(crate) struct Options {
+    pub(crate) collide: CollideOptions,
+    pub(crate) relative: f64,
+    work: Option<u64>,
+    seconds: Option<f64>,
+}
+
+/// The names of options for two scans.
+pub(crate) const OF_SCANS: &[&str] =
+    &["margin", "thickened", "surface_only", "evidence", "detail", "work", "seconds"];
+
+/// The names of options for a distance.
+pub(crate) const OF_DISTANCE: &[&str] = &["thickened", "surface_only", "relative", "work", "seconds"];
+
+/// The names of options for shapes and rays.
+pub(crate) const OF_SHAPES: &[&str] = &["margin", "thickened", "surface_only", "evidence", "detail"];
+
+impl Options {
+    /// Reads options that are among `names`, for a question about `scan`.
+    pub(crate) fn new(given: Option<&Bound<'_, PyDict>>, names: &[&str], scan: &Scan) -> PyResult<Self> {
+        Self::of_metric(given, names, scan.metric())
+    }
+
+    /// Reads options that are among `names`, for a question about scans of this metric.
+    pub(crate) fn of_metric(
+        given: Option<&Bound<'_, PyDict>>,
+        names: &[&str],
+        metric: Metric,
+    ) -> PyResult<Self> {
+        let mut options =
+            Self { collide: CollideOptions::default(), relative: 0.1, work: None, seconds: None };
+        if metric == Metric::Geodesic {
+            options.collide = options.collide.with_semantics(Semantics::Surface);
+        }
+        let Some(given) = given else { return Ok(options) };
+        for (name, value) in given {
+            let name = name.cast::<PyString>()?.to_string();
+            if !names.contains(&name.as_str()) {
+                let known = names.join(", ");
+                return Err(PyTypeError::new_err(format!("expected options among {known}, got `{name}`")));
+            }
+            // Python's `None` is the default.
+            if !value.is_none() {
+                options.set(&name, &value)?;
+            }
+        }
+        Ok(options)
+    }
+
+    fn set(&mut self, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let options = self.collide;
+        match name {
+            "margin" => self.collide = options.with_margin(value.extract()?),
+            "thickened" => self.collide = options.with_semantics(Semantics::Thickened(value.extract()?)),
+            "surface_only" if value.extract()? => self.collide = options.with_semantics(Semantics::Surface),
+            "evidence" => {
+                self.collide = options.with_evidence(match &*value.extract::<String>()? {
+                    "certified" => Evidence::Certified,
+                    "estimated" => Evidence::Estimated,
+                    other => {
+                        return Err(refused(format!(
+                            "expected evidence `certified` or `estimated`, got `{other}`"
+                        )));
+                    }
+                });
+            }
+            "detail" => {
+                self.collide = options.with_detail(match &*value.extract::<String>()? {
+                    "verdict" => Detail::Verdict,
+                    "witness" => Detail::Witness,
+                    other => {
+                        return Err(refused(format!("expected detail `verdict` or `witness`, got `{other}`")));
+                    }
+                });
+            }
+            "relative" => self.relative = value.extract()?,
+            "work" => self.work = Some(value.extract()?),
+            "seconds" => {
+                let seconds: f64 = value.extract()?;
+                if !(seconds >= 0.0) {
+                    return Err(refused(format!("expected a time of at least 0 seconds, got {seconds}")));
+                }
+                self.seconds = Some(seconds);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Returns the budget of a query that starts now.
+    pub(crate) fn budget(&self) -> Budget {
+        let mut budget = Budget::UNLIMITED;
+        if let Some(units) = self.work {
+            budget = budget.with_work(units);
+        }
+        if let Some(seconds) = self.seconds {
+            let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+            budget = budget.with_deadline(Deadline::within(time));
+        }
+        budget
+    }
+}

@@ -1,0 +1,483 @@
+//! `Scan`: a prepared scan and the questions about it.
+
+use std::path::PathBuf;
+
+use nearmiss::{
+    Answer as ScanAnswer, BuildOptions, Check, CollidePlan, Contacts, DistanceOptions, DistancePlan,
+    GraphOptions, Pair, Paths, PointCloud, Pose, Scan as Prepared, Workspace,
+};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
+
+use crate::answers::{
+    Answer, AnswerRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord,
+};
+use crate::arrays::{Points, vector};
+use crate::cloud::rows;
+use crate::failure::{refused, unloadable, unreadable, unwritable};
+use crate::hint::{Hint, busy};
+use crate::options::{OF_DISTANCE, OF_SCANS, OF_SHAPES, Options};
+use crate::poses::{Matrix, Poses, check_each, pose_of};
+use crate::pool::{ask, ask_each};
+use crate::prepare::watched;
+use crate::record::array;
+use crate::target::Target;
+
+/// A prepared scan.
+#[pyclass(frozen, module = "nearmiss")]
+#[derive(Debug)]
+pub(crate) struct Scan(pub(crate) Prepared);
+
+/// How a scan is prepared, read from keywords.
+struct Recipe {
+    build: BuildOptions,
+    graph: Option<(GraphOptions, Option<[f64; 3]>)>,
+}
+
+impl Recipe {
+    /// The names of the options.
+    const NAMES: [&str; 5] = ["radius_neighbours", "reach", "graph", "close_pairs", "scanner"];
+
+    fn new(given: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut recipe = Self { build: BuildOptions::default(), graph: None };
+        let Some(given) = given else { return Ok(recipe) };
+        if let Some(unknown) = given.keys().iter().map(|name| name.to_string()).find(|name| !Self::NAMES.contains(&name.as_str())) {
+            let known = Self::NAMES.join(", ");
+            return Err(pyo3::exceptions::PyTypeError::new_err(format!("expected options among {known}, got `{unknown}`")));
+        }
+        let of = |name: &str| given.get_item(name).map(|value| value.filter(|value| !value.is_none()));
+        if let Some(neighbours) = of("radius_neighbours")? {
+            recipe.build = recipe.build.with_radius_neighbours(neighbours.extract()?);
+        }
+        if let Some(reach) = of("reach")? {
+            recipe.build = recipe.build.with_reach(reach.extract()?);
+        }
+        let is_set = |name: &str| of(name)?.map_or(Ok(false), |value| value.is_truthy());
+        let scanner = of("scanner")?.map(|place| vector(&place, "the scanner")).transpose()?;
+        let close_pairs = is_set("close_pairs")?;
+        if is_set("graph")? || close_pairs || scanner.is_some() {
+            let paths = close_pairs.then_some(Paths::Rebuilt);
+            recipe.graph = Some((GraphOptions::default().with_close_pairs(paths), scanner));
+        }
+        Ok(recipe)
+    }
+
+    /// Prepares a cloud, watched.
+    fn prepare(self, py: Python<'_>, cloud: PointCloud, told: Option<&Bound<'_, PyAny>>) -> PyResult<Prepared> {
+        let work = Workspace::in_memory();
+        let progress = work.progress().clone();
+        let whole = watched(py, told, &progress, move || {
+            let scan = Prepared::build_in(&(&cloud).into(), &self.build, &work).map_err(|cause| cause.to_string())?;
+            match &self.graph {
+                None => Ok(scan),
+                Some((options, scanner)) => {
+                    work.progress().reach(0.0);
+                    let scan = scan.with_graph_watched(&cloud, options, *scanner, work.progress());
+                    scan.map_err(|cause| cause.to_string())
+                }
+            }
+        })?;
+        whole.map_err(refused)
+    }
+}
+
+/// The poses of both scans of a batch; one pose serves all.
+pub(crate) struct PosePairs<'a> {
+    matrices: [&'a [Matrix]; 2],
+    scans: [&'a Prepared; 2],
+}
+
+impl<'a> PosePairs<'a> {
+    pub(crate) fn new(matrices: [&'a [Matrix]; 2], scans: [&'a Prepared; 2]) -> PyResult<Self> {
+        let [a, b] = matrices.map(<[Matrix]>::len);
+        if a != b && a != 1 && b != 1 {
+            return Err(refused(format!(
+                "expected as many poses of both scans, or one of one of them, got {a} and {b}"
+            )));
+        }
+        Ok(Self { matrices, scans })
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        let [a, b] = self.matrices.map(<[Matrix]>::len);
+        if a == 1 { b } else { a }
+    }
+
+    /// The `i`-th pair; `None` if a matrix is no pose.
+    pub(crate) fn pair(&self, i: usize) -> Option<Pair<'a>> {
+        let pose = |side: usize| {
+            let matrices = self.matrices[side];
+            pose_of(&matrices[if matrices.len() == 1 { 0 } else { i }], self.scans[side]).ok()
+        };
+        Some(Pair::new(self.scans[0].at(&pose(0)?), self.scans[1].at(&pose(1)?)))
+    }
+
+    /// Returns the error of the first matrix that is no pose.
+    pub(crate) fn fault(&self) -> PyErr {
+        let checked = (0..2).try_for_each(|side| check_each(self.matrices[side], self.scans[side]));
+        checked.err().unwrap_or_else(|| refused("expected poses, got other matrices"))
+    }
+}
+
+/// Reads how files are checked.
+fn check_of(name: &str) -> PyResult<Check> {
+    match name {
+        "full" => Ok(Check::Full),
+        "structure" => Ok(Check::Structure),
+        other => Err(refused(format!("expected check `full` or `structure`, got `{other}`"))),
+    }
+}
+
+impl Scan {
+    /// Plans a collision of this scan with another one.
+    fn plan(&self, other: &Self, options: Option<&Bound<'_, PyDict>>) -> PyResult<(CollidePlan, Options)> {
+        let options = Options::new(options, OF_SCANS, &self.0)?;
+        Ok((CollidePlan::new(&options.collide, &self.0, &other.0).map_err(refused)?, options))
+    }
+
+    /// Plans a distance of this scan from another one.
+    fn distance_plan(
+        &self,
+        other: &Self,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<(DistancePlan, Options)> {
+        let options = Options::new(options, OF_DISTANCE, &self.0)?;
+        let asked = DistanceOptions::default()
+            .with_semantics(options.collide.semantics)
+            .with_relative(options.relative);
+        Ok((DistancePlan::new(&asked, &self.0, &other.0).map_err(refused)?, options))
+    }
+
+    /// Returns the one pose of each of both scans.
+    fn both(&self, other: &Self, pose: Option<&Bound<'_, PyAny>>, own: Option<&Bound<'_, PyAny>>) -> PyResult<[Pose; 2]> {
+        Ok([Poses::new(own)?.one(&self.0)?, Poses::new(pose)?.one(&other.0)?])
+    }
+}
+
+#[pymethods]
+impl Scan {
+    /// Prepare points of shape (N, 3), float32 or float64; those that are contiguous are not copied.
+    ///
+    /// `normals` has shape (N, 3). `drop_invalid` drops points that are not finite, which raise
+    /// ValueError otherwise. `progress` is called with the share that is done, from 0 to 1. Options:
+    /// `radius_neighbours` (3 to 32, default 6), `reach` (the widest gap that is bridged, a length),
+    /// `graph` (orient the normals), `scanner` (a position of shape (3,) that normals face; implies
+    /// `graph`), `close_pairs` (distances along the surface; implies `graph`). Takes about 1.5 s for a
+    /// million points on two cores; Ctrl-C interrupts it.
+    #[new]
+    #[pyo3(signature = (points, *, normals = None, drop_invalid = false, progress = None, **options))]
+    fn new(
+        points: &Bound<'_, PyAny>,
+        normals: Option<&Bound<'_, PyAny>>,
+        drop_invalid: bool,
+        progress: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let py = points.py();
+        let recipe = Recipe::new(options)?;
+        let mut cloud = Points::new(points)?.cloud(py, drop_invalid)?;
+        if let Some(normals) = normals {
+            #[expect(clippy::cast_possible_truncation, reason = "clouds keep normals in single precision")]
+            let normals: Vec<[f32; 3]> =
+                Points::new(normals)?.to_doubles()?.iter().map(|n| n.map(|c| c as f32)).collect();
+            cloud = cloud.with_normals(&normals).map_err(refused)?;
+        }
+        recipe.prepare(py, cloud, progress).map(Self)
+    }
+
+    /// Prepare the points of a file: PLY, PCD, LAS, LAZ, E57, NPY, OBJ, STL, OFF, glTF or text.
+    ///
+    /// `format` is recognised by default. Other options are those of `Scan`.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, format = None, progress = None, **options))]
+    fn read(
+        py: Python<'_>,
+        path: PathBuf,
+        format: Option<&str>,
+        progress: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let recipe = Recipe::new(options)?;
+        let format = format.map(str::parse).transpose().map_err(refused)?;
+        let cloud = py.detach(|| nearmiss::io::read(&path, format)).map_err(unreadable)?.cloud;
+        recipe.prepare(py, cloud, progress).map(Self)
+    }
+
+    /// Open a prepared file (`.nm`) by mapping it.
+    ///
+    /// `check` is "full", which compares checksums and checks every number, or "structure", for
+    /// files from a trusted source, which takes the same time for any scan.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, check = "full"))]
+    fn open(py: Python<'_>, path: PathBuf, check: &str) -> PyResult<Self> {
+        let check = check_of(check)?;
+        py.detach(|| Prepared::open(&path, check)).map(Self).map_err(unloadable)
+    }
+
+    /// Load a scan from the bytes of `to_bytes` or of a prepared file. `check` is that of `open`.
+    #[staticmethod]
+    #[pyo3(signature = (data, *, check = "full"))]
+    fn from_bytes(py: Python<'_>, data: &[u8], check: &str) -> PyResult<Self> {
+        let check = check_of(check)?;
+        let bytes = data.to_vec();
+        py.detach(|| Prepared::from_bytes(bytes, check)).map(Self).map_err(unloadable)
+    }
+
+    /// Return the contents of a prepared file. Pickling uses them.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let mut bytes = Vec::new();
+        py.detach(|| self.0.write_to(&mut bytes)).map_err(unwritable)?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Save the scan to a prepared file and return its length in bytes.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<u64> {
+        py.detach(|| self.0.save(&path)).map_err(unwritable)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let bytes = slf.get().to_bytes(py)?;
+        PyTuple::new(py, [slf.get_type().getattr("from_bytes")?, PyTuple::new(py, [bytes])?.into_any()])
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let graph = if self.0.graph().is_some() { ", with graph" } else { "" };
+        format!("<Scan of {} points, sampling radius {:.3e}{graph}>", self.0.len(), self.0.sampling_radius())
+    }
+
+    /// The least and the greatest corner, of shape (2, 3).
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let bounds = self.0.bounds();
+        rows(py, [bounds.min, bounds.max].concat(), &[2, 3])
+    }
+
+    /// The 0.9-quantile of the local radii, a length.
+    #[getter]
+    fn sampling_radius(&self) -> f64 {
+        self.0.sampling_radius()
+    }
+
+    /// The widest gap that is bridged, a length.
+    #[getter]
+    fn reach(&self) -> f64 {
+        self.0.reach()
+    }
+
+    /// True if the normals point outwards, as with `graph`.
+    #[getter]
+    fn is_oriented(&self) -> bool {
+        self.0.is_oriented()
+    }
+
+    /// The share of points that sample a sheet.
+    #[getter]
+    fn usable(&self) -> f64 {
+        self.0.usable()
+    }
+
+    /// The numbers of input points that were dropped: those not finite, and duplicates.
+    #[getter]
+    fn dropped(&self) -> (usize, usize) {
+        let dropped = self.0.dropped();
+        (dropped.not_finite, dropped.duplicate)
+    }
+
+    /// The points in the order of the scan, of shape (N, 3).
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let frame = self.0.frame();
+        let flat: Vec<f64> = self.0.positions().iter().flat_map(|&p| frame.to_world(p)).collect();
+        rows(py, flat, &[self.0.len(), 3])
+    }
+
+    /// The normals in the order of the scan, of shape (N, 3).
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        rows(py, self.0.normals().as_flattened().to_vec(), &[self.0.len(), 3])
+    }
+
+    /// The index in the input of each point, of shape (N,).
+    #[getter]
+    fn sources<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        rows(py, self.0.source().to_vec(), &[self.0.len()])
+    }
+
+    /// Decide whether this scan, at `own_pose`, touches `other`, at `pose`.
+    ///
+    /// Poses have shape (4, 4); the default is the identity. Options: `margin` (a length: nearer counts
+    /// as touching), `thickened` (compare balls of this radius about the points), `surface_only`
+    /// (ignore points that sample no surface), `evidence` ("certified" or "estimated"), `detail`
+    /// ("witness" or "verdict"), and budgets: `work` (units of work), `seconds`. A `hint` speeds up
+    /// the next similar question. Returns an Answer. Takes microseconds.
+    #[pyo3(signature = (other, pose = None, own_pose = None, *, hint = None, **options))]
+    fn collide(
+        &self,
+        other: &Bound<'_, Self>,
+        pose: Option<&Bound<'_, PyAny>>,
+        own_pose: Option<&Bound<'_, PyAny>>,
+        hint: Option<&Bound<'_, Hint>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Answer> {
+        let (py, other) = (other.py(), other.get());
+        let (plan, options) = self.plan(other, options)?;
+        let [a, b] = self.both(other, pose, own_pose)?;
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let hint = hint.as_deref_mut();
+        let answer = ask(py, |scratch| {
+            let pair = Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget());
+            match hint {
+                Some(hint) => pair.hinted(hint).collide(&plan, scratch),
+                None => pair.collide(&plan, scratch),
+            }
+        });
+        Ok(Answer(AnswerRecord::new(&answer)))
+    }
+
+    /// Answer `collide` for many poses on all cores.
+    ///
+    /// `poses` and `own_poses` have shape (N, 4, 4); one of them may be a single pose. Returns a
+    /// structured array of shape (N,) with the fields of an Answer. In it `verdict` is 1 for touching,
+    /// 0 for apart and -1 for undecided; `evidence` is 1 for certified, 0 for estimated and -1 for
+    /// none; missing lengths are NaN, missing indices -1.
+    #[pyo3(signature = (other, poses, own_poses = None, **options))]
+    fn collide_each<'py>(
+        &self,
+        other: &Bound<'py, Self>,
+        poses: &Bound<'py, PyAny>,
+        own_poses: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, other) = (other.py(), other.get());
+        let (plan, options) = self.plan(other, options)?;
+        let poses = [Poses::new(own_poses)?, Poses::new(Some(poses))?];
+        let pairs = PosePairs::new([poses[0].matrices()?, poses[1].matrices()?], [&self.0, &other.0])?;
+        let answers = ask_each(py, pairs.len(), |i, scratch| match pairs.pair(i) {
+            Some(pair) => AnswerRecord::new(&pair.within(&options.budget()).collide(&plan, scratch)),
+            None => AnswerRecord { verdict: INVALID, ..AnswerRecord::new(&ScanAnswer::UNASKED) },
+        })?;
+        if answers.iter().any(|answer| answer.verdict == INVALID) {
+            return Err(pairs.fault());
+        }
+        array(py, answers)
+    }
+
+    /// Bound the distance of this scan, at `own_pose`, and `other`, at `pose`: lower ≤ distance ≤
+    /// upper.
+    ///
+    /// Poses have shape (4, 4). Options: `thickened`, `surface_only`, `work` and `seconds` as for
+    /// `collide`, and `relative` (how far the lower bound may stay below the upper one, as a share of
+    /// it; 0.1 by default). Returns a Distance; lengths are in the units of the world.
+    #[pyo3(signature = (other, pose = None, own_pose = None, **options))]
+    fn distance(
+        &self,
+        other: &Bound<'_, Self>,
+        pose: Option<&Bound<'_, PyAny>>,
+        own_pose: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Distance> {
+        let (py, other) = (other.py(), other.get());
+        let (plan, options) = self.distance_plan(other, options)?;
+        let [a, b] = self.both(other, pose, own_pose)?;
+        let distance = ask(py, |scratch| {
+            Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget()).distance(&plan, scratch)
+        });
+        Ok(Distance(DistanceRecord::new(&distance)))
+    }
+
+    /// Answer `distance` for many poses on all cores; see `collide_each`. Returns a structured array
+    /// of shape (N,) with the fields of a Distance.
+    #[pyo3(signature = (other, poses, own_poses = None, **options))]
+    fn distance_each<'py>(
+        &self,
+        other: &Bound<'py, Self>,
+        poses: &Bound<'py, PyAny>,
+        own_poses: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, other) = (other.py(), other.get());
+        let (plan, options) = self.distance_plan(other, options)?;
+        let poses = [Poses::new(own_poses)?, Poses::new(Some(poses))?];
+        let pairs = PosePairs::new([poses[0].matrices()?, poses[1].matrices()?], [&self.0, &other.0])?;
+        let distances = ask_each(py, pairs.len(), |i, scratch| {
+            let distance = pairs.pair(i).map(|pair| pair.within(&options.budget()).distance(&plan, scratch));
+            distance.map_or_else(bytemuck::Zeroable::zeroed, |distance| DistanceRecord::new(&distance))
+        })?;
+        // The band of an answer is above 0.
+        if distances.iter().any(|distance| distance.band == 0.0) {
+            return Err(pairs.fault());
+        }
+        array(py, distances)
+    }
+
+    /// Return a contact of each pair of leaves that touch, as a structured array of shape (N,).
+    ///
+    /// Its fields are `point`, `normal_a`, `normal_b`, `residual`, `source_a` and `source_b`; sources
+    /// are indices of the input points. Options are those of `collide`.
+    #[pyo3(signature = (other, pose = None, own_pose = None, **options))]
+    fn contacts<'py>(
+        &self,
+        other: &Bound<'py, Self>,
+        pose: Option<&Bound<'py, PyAny>>,
+        own_pose: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, other) = (other.py(), other.get());
+        let (plan, options) = self.plan(other, options)?;
+        let [a, b] = self.both(other, pose, own_pose)?;
+        let mut found = Contacts::default();
+        ask(py, |scratch| {
+            let pair = Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget());
+            pair.contacts(&mut found).collide(&plan, scratch)
+        });
+        array(py, found.contacts.iter().map(ContactRecord::new).collect())
+    }
+
+    /// Return up to eight contact points for a physics solver, the deepest first, as a structured
+    /// array of shape (N,).
+    ///
+    /// Its fields are `point`, `normal` (the direction in which this scan moves out of `other`), `gap`
+    /// (negative for penetration), `source_a` and `source_b`. Options are those of `collide`.
+    #[pyo3(signature = (other, pose = None, own_pose = None, *, hint = None, **options))]
+    fn manifold<'py>(
+        &self,
+        other: &Bound<'py, Self>,
+        pose: Option<&Bound<'py, PyAny>>,
+        own_pose: Option<&Bound<'py, PyAny>>,
+        hint: Option<&Bound<'py, Hint>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, other) = (other.py(), other.get());
+        let (plan, options) = self.plan(other, options)?;
+        let [a, b] = self.both(other, pose, own_pose)?;
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let hint = hint.as_deref_mut();
+        let mut found = Vec::new();
+        ask(py, |scratch| {
+            let pair = Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget());
+            let question = pair.manifold(&mut found);
+            match hint {
+                Some(hint) => question.hinted(hint).collide(&plan, scratch),
+                None => question.collide(&plan, scratch),
+            }
+        });
+        array(py, found.iter().map(ManifoldRecord::new).collect())
+    }
+
+    /// Place the scan at `pose` of shape (4, 4), for questions about shapes and rays.
+    ///
+    /// Options: `margin`, `thickened`, `surface_only`, `evidence` and `detail`, as for `collide`.
+    #[pyo3(signature = (pose = None, **options))]
+    fn target(&self, pose: Option<&Bound<'_, PyAny>>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Target> {
+        let options = Options::new(options, OF_SHAPES, &self.0)?;
+        Target::new(&self.0, Poses::new(pose)?.one(&self.0)?, &options)
+    }
+}
+
+/// The verdict of a query with a matrix that is no pose.
+const INVALID: i8 = i8::MIN;

@@ -1,0 +1,186 @@
+//! Answers about shapes and rays.
+
+use nearmiss::ShapeVerdict;
+use pyo3::prelude::*;
+
+use crate::codes::{NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, verdict_name, number, plain, reason_code, reason_name, shown, undecided, vector};
+use crate::record::record;
+
+record! {
+    /// An answer of `touch`.
+    ShapeRecord {
+        point: [f64; 3] = "3f8",
+        band: f64 = "f8",
+        source: i64 = "i8",
+        verdict: i8 = "i1",
+        evidence: i8 = "i1",
+        reason: i8 = "i1",
+        _padding: [u8; 5] = "5u1",
+    }
+}
+
+impl ShapeRecord {
+    pub(crate) fn new(answer: &nearmiss::ShapeAnswer) -> Self {
+        let band = answer.band;
+        let none =
+            Self { point: NOWHERE, band, source: -1, verdict: -1, evidence: -1, reason: 0, _padding: [0; 5] };
+        match answer.verdict {
+            ShapeVerdict::Touching { point, source, evidence } => {
+                Self { point, source: source.0.into(), verdict: 1, evidence: evidence_code(evidence), ..none }
+            }
+            ShapeVerdict::Separated { evidence } => {
+                Self { verdict: 0, evidence: evidence_code(evidence), ..none }
+            }
+            ShapeVerdict::Undecided(reason) => Self { reason: reason_code(reason), ..none },
+        }
+    }
+}
+
+answer! {
+    /// The answer of `Scan.touch`.
+    ShapeAnswer of ShapeRecord by touch_in_words {
+        @verdict touches: ["separated", "touching"],
+        evidence: Option<&'static str> = evidence_name,
+        reason: Option<&'static str> = reason_name,
+        point: Option<[f64; 3]> = vector,
+        source: Option<i64> = index,
+        band: f64 = plain,
+    }
+}
+
+fn touch_in_words(record: &ShapeRecord) -> String {
+    match record.verdict {
+        1 => format!("touching at {:?}{}", record.point, shown(record.evidence)),
+        0 => format!("apart{}", shown(record.evidence)),
+        _ => undecided(record.reason),
+    }
+}
+
+record! {
+    /// Bounds on the distance of a shape.
+    ShapeDistanceRecord {
+        point: [f64; 3] = "3f8",
+        point_of_shape: [f64; 3] = "3f8",
+        lower: f64 = "f8",
+        upper: f64 = "f8",
+        band: f64 = "f8",
+        source: i64 = "i8",
+        evidence: i8 = "i1",
+        _padding: [u8; 7] = "7u1",
+    }
+}
+
+impl ShapeDistanceRecord {
+    /// The record of a distance; infinite bounds if there is nothing within the reach.
+    pub(crate) fn new(distance: Option<&nearmiss::ShapeDistance>) -> Self {
+        let Some(distance) = distance else {
+            let (lower, upper) = (f64::INFINITY, f64::INFINITY);
+            let points = [NOWHERE; 2];
+            let [point, point_of_shape] = points;
+            return Self {
+                point,
+                point_of_shape,
+                lower,
+                upper,
+                band: NONE,
+                source: -1,
+                evidence: -1,
+                _padding: [0; 7],
+            };
+        };
+        let [point, point_of_shape] = distance.points;
+        Self {
+            point,
+            point_of_shape,
+            lower: distance.lower,
+            upper: distance.upper,
+            band: distance.band,
+            source: distance.source.0.into(),
+            evidence: evidence_code(distance.evidence),
+            _padding: [0; 7],
+        }
+    }
+}
+
+answer! {
+    /// The answer of `Scan.shape_distance`.
+    ShapeDistance of ShapeDistanceRecord by shape_distance_in_words {
+        lower: f64 = plain,
+        upper: f64 = plain,
+        point: Option<[f64; 3]> = vector,
+        point_of_shape: Option<[f64; 3]> = vector,
+        source: Option<i64> = index,
+        band: Option<f64> = number,
+        evidence: Option<&'static str> = evidence_name,
+    }
+}
+
+fn shape_distance_in_words(record: &ShapeDistanceRecord) -> String {
+    format!("between {} and {}{}", record.lower, record.upper, shown(record.evidence))
+}
+
+record! {
+    /// A contact of a shape.
+    ShapeContactRecord {
+        point: [f64; 3] = "3f8",
+        normal: [f64; 3] = "3f8",
+        depth: f64 = "f8",
+        id: u64 = "u8",
+    }
+}
+
+impl ShapeContactRecord {
+    pub(crate) fn new(contact: &nearmiss::ShapeContact) -> Self {
+        Self { point: contact.point, normal: contact.normal, depth: contact.depth, id: contact.id }
+    }
+}
+
+record! {
+    /// An answer of `cast`.
+    RayRecord {
+        point: [f64; 3] = "3f8",
+        normal: [f64; 3] = "3f8",
+        t: f64 = "f8",
+        source: i64 = "i8",
+        hit: u8 = "?",
+        evidence: i8 = "i1",
+        _padding: [u8; 6] = "6u1",
+    }
+}
+
+impl RayRecord {
+    pub(crate) fn new(answer: &nearmiss::RayAnswer) -> Self {
+        let evidence = evidence_code(answer.evidence);
+        let _padding = [0; 6];
+        match answer.hit {
+            Some(hit) => Self {
+                point: hit.point,
+                normal: hit.normal,
+                t: hit.t,
+                source: hit.source.0.into(),
+                hit: 1,
+                evidence,
+                _padding,
+            },
+            None => Self { point: NOWHERE, normal: NOWHERE, t: NONE, source: -1, hit: 0, evidence, _padding },
+        }
+    }
+}
+
+answer! {
+    /// The answer of `Scan.cast`.
+    RayAnswer of RayRecord by ray_in_words {
+        hit: bool = is_one,
+        t: Option<f64> = number,
+        point: Option<[f64; 3]> = vector,
+        normal: Option<[f64; 3]> = vector,
+        source: Option<i64> = index,
+        evidence: Option<&'static str> = evidence_name,
+    }
+}
+
+fn ray_in_words(record: &RayRecord) -> String {
+    let evidence = shown(record.evidence);
+    if record.hit == 1 { format!("hit at t = {}{evidence}", record.t) } else { format!("no hit{evidence}") }
+}
+

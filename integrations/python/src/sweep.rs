@@ -1,0 +1,123 @@
+//! Sweeps: whole motions of two scans.
+
+use nearmiss::{Motion, Prepared as _, Scan as Prepared, Sweep, SweepOptions, SweepPlan, SweepVerdict};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::codes::{
+    NONE, NOWHERE, answer, evidence_code, evidence_name, is_touching, verdict_name, number, plain, reason_name, shown,
+    sweep_reason_code, undecided, vector,
+};
+use crate::failure::refused;
+use crate::options::Options;
+use crate::pool::ask;
+use crate::poses::{Poses, check_each, pose_of};
+use crate::scan::Scan;
+
+/// The names of options of a sweep.
+const OF_SWEEP: &[&str] = &["thickened", "surface_only", "work", "seconds"];
+
+/// Returns the motion of `scan` through poses.
+fn motion(given: Option<&Bound<'_, PyAny>>, scan: &Prepared) -> PyResult<Motion> {
+    let poses = Poses::new(given)?;
+    let matrices = poses.matrices()?;
+    check_each(matrices, scan)?;
+    let poses: Result<Vec<_>, _> = matrices.iter().map(|matrix| pose_of(matrix, scan)).collect();
+    Motion::through(&poses.map_err(refused)?).map_err(refused)
+}
+
+/// Prove that a whole motion is free, or find the first impact.
+///
+/// `a` moves through the poses `path_a`, `b` through `path_b`, of shape (N, 4, 4), by screws; pose k is
+/// reached at time k. A single pose of shape (4, 4) stays. `clearance` is the distance that they keep, a
+/// length. Options: `thickened`, `surface_only`, `work`, `seconds`, as for `Scan.collide`. Returns a
+/// SweepAnswer, whose times count poses.
+#[pyfunction]
+#[pyo3(signature = (a, b, path_b, path_a = None, *, clearance = 0.0, **options))]
+pub(crate) fn sweep(
+    a: &Bound<'_, Scan>,
+    b: &Bound<'_, Scan>,
+    path_b: &Bound<'_, PyAny>,
+    path_a: Option<&Bound<'_, PyAny>>,
+    clearance: f64,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<SweepAnswer> {
+    let (py, a, b) = (a.py(), &a.get().0, &b.get().0);
+    let options = Options::new(options, OF_SWEEP, a)?;
+    let asked = SweepOptions::default().with_semantics(options.collide.semantics).with_clearance(clearance);
+    let plan = SweepPlan::new(&asked, a, b).map_err(refused)?;
+    let (way_a, way_b) = (motion(path_a, a)?, motion(Some(path_b), b)?);
+    let answer = ask(py, |scratch| {
+        let sweep = Sweep::new(a.along(&way_a), b.along(&way_b)).within(&options.budget());
+        sweep.first_impact(&plan, scratch)
+    });
+    Ok(SweepAnswer(SweepRecord::new(&answer, way_a.duration().max(way_b.duration()))))
+}
+
+/// The numbers of a sweep. No array holds them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SweepRecord {
+    verdict: i8,
+    evidence: i8,
+    reason: i8,
+    t_free: f64,
+    t_hit: f64,
+    clearance: f64,
+    upper: f64,
+    at: f64,
+    band: f64,
+    witness: [f64; 3],
+}
+
+impl SweepRecord {
+    pub(crate) fn new(answer: &nearmiss::SweepAnswer, duration: f64) -> Self {
+        let none = Self {
+            verdict: -1,
+            evidence: -1,
+            reason: 0,
+            t_free: NONE,
+            t_hit: NONE,
+            clearance: NONE,
+            upper: NONE,
+            at: NONE,
+            band: answer.band,
+            witness: NOWHERE,
+        };
+        match answer.verdict {
+            SweepVerdict::Free { clearance, upper, at } => {
+                Self { verdict: 0, evidence: 1, t_free: duration, clearance, upper, at, ..none }
+            }
+            SweepVerdict::Impact { t_free, t_hit, contact, evidence } => {
+                let (witness, evidence) = (contact.point, evidence_code(evidence));
+                Self { verdict: 1, evidence, t_free, t_hit, witness, ..none }
+            }
+            SweepVerdict::Undecided { t_free, reason } => {
+                Self { t_free, reason: sweep_reason_code(reason), ..none }
+            }
+        }
+    }
+}
+
+answer! {
+    /// The answer of `sweep`.
+    SweepAnswer of SweepRecord by sweep_in_words {
+        @verdict hits: ["free", "impact"],
+        evidence: Option<&'static str> = evidence_name,
+        reason: Option<&'static str> = reason_name,
+        t_free: f64 = plain,
+        t_hit: Option<f64> = number,
+        clearance: Option<f64> = number,
+        upper: Option<f64> = number,
+        at: Option<f64> = number,
+        band: f64 = plain,
+        witness: Option<[f64; 3]> = vector,
+    }
+}
+
+fn sweep_in_words(record: &SweepRecord) -> String {
+    match record.verdict {
+        1 => format!("impact at t = {}, free up to {}{}", record.t_hit, record.t_free, shown(record.evidence)),
+        0 => format!("free, at least {} apart", record.clearance),
+        _ => format!("free up to {}, then {}", record.t_free, undecided(record.reason)),
+    }
+}

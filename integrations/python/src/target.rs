@@ -1,0 +1,217 @@
+//! `Target`: a placed scan against shapes and rays.
+
+use nearmiss::{Pose, Ray, Scan as Prepared, Scratch, ShapePlan};
+use pyo3::prelude::*;
+
+use crate::arrays::{Points, vector, wrong_shape};
+use crate::failure::refused;
+use crate::hint::{ShapeHint, busy};
+use crate::options::Options;
+use crate::pool::{ask, ask_each};
+use crate::record::{Record, array};
+use crate::shape::Shape;
+use crate::shape_answers::{
+    RayAnswer, RayRecord, ShapeAnswer, ShapeContactRecord, ShapeDistance, ShapeDistanceRecord, ShapeRecord,
+};
+
+/// A placed scan, with the meaning of options.
+#[pyclass(frozen, module = "nearmiss")]
+#[derive(Debug)]
+pub(crate) struct Target {
+    scan: Prepared,
+    pose: Pose,
+    plan: ShapePlan,
+}
+
+impl Target {
+    pub(crate) fn new(scan: &Prepared, pose: Pose, options: &Options) -> PyResult<Self> {
+        let plan = ShapePlan::new(&options.collide, scan).map_err(refused)?;
+        Ok(Self { scan: scan.clone(), pose, plan })
+    }
+
+    fn at(&self) -> nearmiss::Target<'_> {
+        nearmiss::Target::new(self.scan.at(&self.pose), &self.plan)
+    }
+
+    /// Asks about each of a sequence of shapes.
+    fn each<'py, R: Record + Send>(
+        &self,
+        given: &Bound<'py, PyAny>,
+        question: impl Fn(&nearmiss::Target<'_>, &nearmiss::Shape<'_>, &mut Scratch) -> R + Sync,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let kept: Vec<Bound<'py, Shape>> = given.extract().map_err(|_| {
+            refused("expected a sequence of Shape, got something else; make them, as by Shape.sphere")
+        })?;
+        let shapes: Vec<nearmiss::Shape<'_>> = kept.iter().map(|shape| shape.get().convex()).collect();
+        let target = self.at();
+        let answers = ask_each(given.py(), shapes.len(), |i, scratch| question(&target, &shapes[i], scratch));
+        array(given.py(), answers?)
+    }
+
+    /// Reads one ray.
+    fn ray(origin: &Bound<'_, PyAny>, direction: &Bound<'_, PyAny>, max: f64, radius: f64) -> PyResult<Ray> {
+        check_lengths(max, radius)?;
+        made([vector(origin, "the origin")?, vector(direction, "the direction")?], [max, radius], 0)
+    }
+
+    /// Reads rays from arrays of shape (N, 3), one of which may have shape (3,).
+    fn rays(
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        max: f64,
+        radius: f64,
+    ) -> PyResult<Vec<Ray>> {
+        check_lengths(max, radius)?;
+        let read = |given: &Bound<'_, PyAny>| match given.extract::<[f64; 3]>() {
+            Ok(one) => Ok(vec![one]),
+            Err(_) => Points::new(given)?.to_doubles(),
+        };
+        let (starts, ways) = (read(origins)?, read(directions)?);
+        let count = if starts.len() == 1 { ways.len() } else { starts.len() };
+        if ways.len() != count && ways.len() != 1 {
+            let expected = format!("directions of shape ({count}, 3), one for each origin");
+            return Err(wrong_shape(&expected, directions));
+        }
+        let one_of = |all: &[[f64; 3]], i: usize| all[if all.len() == 1 { 0 } else { i }];
+        (0..count).map(|i| made([one_of(&starts, i), one_of(&ways, i)], [max, radius], i)).collect()
+    }
+}
+
+/// Checks the greatest length and the radius of rays.
+fn check_lengths(max: f64, radius: f64) -> PyResult<()> {
+    if !(max >= 0.0) {
+        return Err(refused(format!("expected a greatest length of rays of at least 0, got {max}")));
+    }
+    if !(radius >= 0.0 && radius.is_finite()) {
+        return Err(refused(format!("expected a finite radius of rays of at least 0, got {radius}")));
+    }
+    Ok(())
+}
+
+/// Makes the `i`-th ray.
+fn made([origin, way]: [[f64; 3]; 2], [max, radius]: [f64; 2], i: usize) -> PyResult<Ray> {
+    if !origin.iter().chain(&way).all(|c| c.is_finite()) || way == [0.0; 3] {
+        return Err(refused(format!(
+            "expected a finite origin and a finite direction other than 0, got {origin:?} and {way:?} (ray {i})"
+        )));
+    }
+    Ok(Ray::new(origin, way).with_max(max).with_radius(radius))
+}
+
+#[pymethods]
+impl Target {
+    fn __repr__(&self) -> String {
+        format!("<Target: {} points at {:?}>", self.scan.len(), self.pose.translation())
+    }
+
+    /// Decide whether a shape touches the scan. Returns a ShapeAnswer.
+    fn touch(&self, shape: &Bound<'_, Shape>) -> ShapeAnswer {
+        let convex = shape.get().convex();
+        ShapeAnswer(ask(shape.py(), |scratch| ShapeRecord::new(&self.at().touch(&convex, scratch))))
+    }
+
+    /// Answer `touch` for a sequence of shapes on all cores. Returns a structured array of shape (N,)
+    /// with the fields of a ShapeAnswer.
+    fn touch_each<'py>(&self, shapes: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        self.each(shapes, |target, shape, scratch| ShapeRecord::new(&target.touch(shape, scratch)))
+    }
+
+    /// Bound the distance of a shape and the scan: lower ≤ distance ≤ upper. Both are infinite if
+    /// nothing is within the length `within`. Returns a ShapeDistance.
+    #[pyo3(signature = (shape, within = f64::INFINITY))]
+    fn distance(&self, shape: &Bound<'_, Shape>, within: f64) -> PyResult<ShapeDistance> {
+        check_reach(within)?;
+        let convex = shape.get().convex();
+        let record =
+            |scratch: &mut Scratch| ShapeDistanceRecord::new(self.at().distance(&convex, within, scratch).as_ref());
+        Ok(ShapeDistance(ask(shape.py(), record)))
+    }
+
+    /// Answer `distance` for a sequence of shapes on all cores. Returns a structured array of shape
+    /// (N,) with the fields of a ShapeDistance.
+    #[pyo3(signature = (shapes, within = f64::INFINITY))]
+    fn distance_each<'py>(&self, shapes: &Bound<'py, PyAny>, within: f64) -> PyResult<Bound<'py, PyAny>> {
+        check_reach(within)?;
+        self.each(shapes, |target, shape, scratch| {
+            ShapeDistanceRecord::new(target.distance(shape, within, scratch).as_ref())
+        })
+    }
+
+    /// Return up to eight contacts of a shape, the deepest first, as a structured array of shape (N,).
+    ///
+    /// Its fields are `point`, `normal` (the direction in which the shape moves out), `depth` (negative
+    /// for a gap within the margin) and `id`, which stays the same from frame to frame with a `hint`.
+    #[pyo3(signature = (shape, *, hint = None))]
+    fn contacts<'py>(
+        &self,
+        py: Python<'py>,
+        shape: &Bound<'py, Shape>,
+        hint: Option<&Bound<'py, ShapeHint>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let shape = shape.get().convex();
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let hint = hint.as_deref_mut();
+        let mut found = Vec::new();
+        ask(py, |scratch| match hint {
+            Some(hint) => self.at().contacts_hinted(&shape, hint, &mut found, scratch),
+            None => self.at().contacts(&shape, &mut found, scratch),
+        });
+        array(py, found.iter().map(ShapeContactRecord::new).collect())
+    }
+
+    /// Find the first place where a ray, or a ball of `radius` along it, hits the scan.
+    ///
+    /// `origin` and `direction` have shape (3,); the direction need not be a unit vector. `max` is the
+    /// greatest length. Returns a RayAnswer, whose `t` is a length.
+    #[pyo3(signature = (origin, direction, *, max = f64::INFINITY, radius = 0.0))]
+    fn cast(
+        &self,
+        origin: &Bound<'_, PyAny>,
+        direction: &Bound<'_, PyAny>,
+        max: f64,
+        radius: f64,
+    ) -> PyResult<RayAnswer> {
+        let ray = Self::ray(origin, direction, max, radius)?;
+        Ok(RayAnswer(ask(origin.py(), |scratch| RayRecord::new(&self.at().cast(&ray, scratch)))))
+    }
+
+    /// Answer `cast` for many rays on all cores. `origins` and `directions` have shape (N, 3); one of
+    /// them may have shape (3,). Returns a structured array of shape (N,) with the fields of a
+    /// RayAnswer; `t` is NaN where nothing is hit.
+    #[pyo3(signature = (origins, directions, *, max = f64::INFINITY, radius = 0.0))]
+    fn cast_each<'py>(
+        &self,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        max: f64,
+        radius: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, rays) = (origins.py(), Self::rays(origins, directions, max, radius)?);
+        let target = self.at();
+        array(py, ask_each(py, rays.len(), |i, scratch| RayRecord::new(&target.cast(&rays[i], scratch)))?)
+    }
+
+    /// Return all places where one ray hits the scan, the nearest first, as a structured array of
+    /// shape (N,) with the fields of a RayAnswer.
+    #[pyo3(signature = (origin, direction, *, max = f64::INFINITY, radius = 0.0))]
+    fn cast_all<'py>(
+        &self,
+        origin: &Bound<'py, PyAny>,
+        direction: &Bound<'py, PyAny>,
+        max: f64,
+        radius: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let ray = Self::ray(origin, direction, max, radius)?;
+        let mut found = Vec::new();
+        ask(origin.py(), |scratch| self.at().cast_all(&ray, &mut found, scratch));
+        let record = |hit: &nearmiss::RayHit| {
+            RayRecord::new(&nearmiss::RayAnswer { hit: Some(*hit), evidence: hit.evidence })
+        };
+        array(origin.py(), found.iter().map(record).collect())
+    }
+}
+
+/// Checks the reach of a distance.
+fn check_reach(within: f64) -> PyResult<()> {
+    if within >= 0.0 { Ok(()) } else { Err(refused(format!("expected a reach of at least 0, got {within}"))) }
+}

@@ -1,0 +1,126 @@
+"""Memory, threads, forks and spawned processes; pictures."""
+
+import gc
+import multiprocessing
+import os
+import threading
+import tracemalloc
+import unittest
+
+import numpy as np
+
+import nearmiss
+from scenes import dragon, plate, poses
+
+#: Builds and queries; `NEARMISS_LEAKS=100000` runs as many as the guide claims.
+ROUNDS = int(os.environ.get("NEARMISS_LEAKS", "2000"))
+
+
+def resident():
+    """The memory of this process in bytes."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def verdicts(seed):
+    """The verdicts of a batch, and of single questions."""
+    scan, at = dragon(), poses(seed, 40, 0.1)
+    single = [scan.collide(scan, pose).touches for pose in at]
+    return single == [bool(v) for v in scan.collide_each(scan, at)["verdict"]]
+
+
+class Memory(unittest.TestCase):
+    @unittest.skipUnless(os.path.exists("/proc/self/statm"), "needs /proc")
+    def test_nothing_leaks(self):
+        points, scan, pose = plate(count=8), dragon(), poses(1, 1, 0.1)[0]
+        shape = nearmiss.Shape.sphere([0, 0.1, 0], 0.01)
+        target, hint, bad = scan.target(), nearmiss.Hint(), np.ones((4, 4))
+
+        def ask(count):
+            for _ in range(count):
+                scan.collide(scan, pose, hint=hint, margin=0.001)
+                target.touch(shape)
+                target.cast([0, 0, 1], [0, 0, -1])
+                scan.manifold(scan, pose)
+                try:
+                    scan.collide(scan, bad)
+                except ValueError:
+                    pass
+
+        def build(count):
+            for _ in range(count):
+                small = nearmiss.Scan(points)
+                nearmiss.Scan.from_bytes(small.to_bytes())
+                small.collide_each(small, pose[None])
+
+        for work, count in ((ask, 5 * ROUNDS), (build, ROUNDS)):
+            work(count // 5 + 100)
+            gc.collect()
+            tracemalloc.start()
+            before, traced = resident(), tracemalloc.get_traced_memory()[0]
+            work(count)
+            gc.collect()
+            grown = resident() - before
+            kept = tracemalloc.get_traced_memory()[0] - traced
+            tracemalloc.stop()
+            self.assertLess(kept, 20_000, f"{work.__name__}: bytes of Python after {count}")
+            self.assertLess(grown, 8 << 20, f"{work.__name__}: resident bytes after {count}")
+
+
+class Concurrency(unittest.TestCase):
+    def test_threads_share_a_scan(self):
+        wrong = []
+
+        def work(seed):
+            if not verdicts(seed):
+                wrong.append(seed)
+
+        threads = [threading.Thread(target=work, args=(seed,)) for seed in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(wrong, [])
+
+    @unittest.skipUnless(hasattr(os, "fork"), "needs fork")
+    def test_forked_processes_answer_and_prepare(self):
+        self.assertTrue(verdicts(1), "starts the threads of this process")
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            self.assertEqual(pool.map_async(verdicts, range(4)).get(60), [True] * 4)
+            again = pool.apply_async(nearmiss.Scan, (plate(),)).get(60)
+        self.assertEqual(again.to_bytes(), nearmiss.Scan(plate()).to_bytes())
+
+    def test_spawned_processes_get_pickled_scans(self):
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            count = pool.apply_async(len, (dragon(),)).get(120)
+        self.assertEqual(count, len(dragon()))
+
+
+class Pictures(unittest.TestCase):
+    def test_plots(self):
+        try:
+            import matplotlib
+        except ImportError:
+            self.skipTest("needs matplotlib")
+        matplotlib.use("agg")
+        from nearmiss import plot
+
+        scan, apart = dragon(), nearmiss.pose(translation=[0.24, 0, 0])
+        self.assertIn("apart", plot.contact(scan, scan, apart).get_title())
+        self.assertEqual(plot.contact(scan, scan, nearmiss.pose(translation=[0.05, 0, 0])).get_title(), "touching")
+        plot.clearance(scan.distance_each(scan, poses(1, 20, 0.2)))
+
+    def test_scipy_rotations(self):
+        try:
+            from scipy.spatial.transform import Rotation
+        except ImportError:
+            self.skipTest("needs scipy")
+        turn, scan = Rotation.from_euler("xyz", [0.1, 0.2, 0.3]), dragon()
+        by_scipy = scan.distance(scan, (turn, [0.3, 0, 0]))
+        self.assertEqual(by_scipy.lower, scan.distance(scan, nearmiss.pose(turn.as_matrix(), [0.3, 0, 0])).lower)
+        many = Rotation.from_rotvec(np.random.default_rng(0).normal(size=(5, 3)))
+        self.assertEqual(scan.collide_each(scan, (many, [0.3, 0, 0])).shape, (5,))
+
+
+if __name__ == "__main__":
+    unittest.main()

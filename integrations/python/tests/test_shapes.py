@@ -1,0 +1,209 @@
+"""Shapes, rays, sweeps, worlds, slice maps, messages of ROS."""
+
+import tempfile
+import unittest
+from types import SimpleNamespace
+
+import numpy as np
+
+import nearmiss
+from nearmiss import Shape
+from scenes import dragon, plate, poses
+
+
+def room():
+    """A room of 6 by 4, with a step of 0.2 across the middle."""
+    x, y = np.meshgrid(np.arange(0, 6.001, 0.04), np.arange(0, 4.001, 0.04), indexing="ij")
+    floor = np.stack([x.ravel(), y.ravel(), np.where(x < 3, 0.0, 0.2).ravel()], axis=1)
+    walls = []
+    for h in np.arange(0, 2.6, 0.04):
+        across, along = np.arange(0, 6.001, 0.04), np.arange(0, 4.001, 0.04)
+        for y in (0.0, 4.0):
+            walls.append(np.stack([across, np.full_like(across, y), np.full_like(across, h)], axis=1))
+        for x in (0.0, 6.0):
+            walls.append(np.stack([np.full_like(along, x), along, np.full_like(along, h)], axis=1))
+    return np.concatenate([floor, *walls])
+
+
+class Shapes(unittest.TestCase):
+    def setUp(self):
+        self.floor = nearmiss.Scan(plate())
+
+    def test_each_shape_stands_on_the_floor(self):
+        target = self.floor.target(margin=0.005)
+        at = nearmiss.pose(translation=[0.5, 0.5, 0.2])
+        upright = nearmiss.pose([[1, 0, 0], [0, 0, -1], [0, 1, 0]], [0.5, 0.5, 0.2])
+        corners = [[x, y, z] for x in (0.4, 0.6) for y in (0.4, 0.6) for z in (0.1, 0.3)]
+        for shape in (
+            Shape.sphere([0.5, 0.5, 0.2], 0.1),
+            Shape.capsule([0.5, 0.5, 0.2], [0.6, 0.5, 0.2], 0.1),
+            Shape.box([0.1, 0.1, 0.1], at),
+            Shape.box([0.1, 0.1, 0.05], at, rounding=0.05),
+            Shape.cylinder(0.1, 0.05, upright),
+            Shape.cone(0.1, 0.05, upright),
+            Shape.triangle([[0.5, 0.5, 0.1], [0.6, 0.5, 0.3], [0.5, 0.6, 0.3]]),
+            Shape.hull(corners),
+        ):
+            distance = target.distance(shape)
+            self.assertLessEqual(distance.lower, 0.1, shape)
+            self.assertAlmostEqual(distance.upper, 0.1, 6, shape)
+            self.assertFalse(target.touch(shape).touches, shape)
+            self.assertTrue(self.floor.target(margin=0.11).touch(shape).touches, shape)
+            self.assertIsInstance(repr(shape), str)
+
+    def test_contacts_push_out(self):
+        target, hint = self.floor.target(margin=0.005), nearmiss.ShapeHint()
+        height, ids = 0.12, set()
+        for _ in range(100):
+            height -= 0.002
+            contacts = target.contacts(Shape.sphere([0.5, 0.5, height], 0.1), hint=hint)
+            if len(contacts):
+                height += max(contacts["depth"][0], 0) * contacts["normal"][0, 2]
+                ids.add(int(contacts["id"][0]))
+        self.assertAlmostEqual(height, 0.1, 3)
+        self.assertEqual(len(ids), 1)
+        hint.clear()
+
+    def test_batches_equal_single_questions(self):
+        target = dragon().target(poses(1, 1, 0.01)[0])
+        rng = np.random.default_rng(3)
+        shapes = [Shape.sphere(c, 0.01) for c in rng.uniform(*dragon().bounds, size=(100, 3))]
+        touched, away = target.touch_each(shapes), target.distance_each(shapes, within=0.05)
+        self.assertGreater(touched["verdict"].sum(), 3)
+        for i, shape in enumerate(shapes):
+            self.assertEqual(target.touch(shape).touches, bool(touched["verdict"][i]))
+            self.assertEqual(target.distance(shape, 0.05).upper, away["upper"][i])
+        origins, ways = rng.uniform(-0.3, 0.3, size=(100, 3)), rng.normal(size=(100, 3))
+        hits = target.cast_each(origins, ways, max=1.0)
+        for i in range(100):
+            single = target.cast(origins[i], ways[i], max=1.0)
+            self.assertEqual(single.hit, hits["hit"][i])
+            if single.hit:
+                self.assertEqual(single.t, hits["t"][i])
+                along = origins[i] + ways[i] / np.linalg.norm(ways[i]) * single.t
+                np.testing.assert_allclose(single.point, along, atol=1e-6)
+        self.assertEqual(target.touch_each([]).shape, (0,))
+
+    def test_rays(self):
+        target = self.floor.target()
+        hit = target.cast([0.3, 0.3, 2], [0, 0, -5])
+        self.assertAlmostEqual(hit.t, 2.0, 6)
+        self.assertGreater(abs(hit.normal[2]), 0.99)
+        self.assertFalse(target.cast([0.3, 0.3, 2], [0, 0, -1], max=1.0).hit)
+        self.assertAlmostEqual(target.cast([0.3, 0.3, 2], [0, 0, -1], radius=0.1).t, 1.9, 6)
+        self.assertEqual(len(target.cast_all([0.3, 0.3, 2], [0, 0, -1])), 1)
+        down = target.cast_each([[0.1, 0.1, 1], [5, 5, 1]], [0, 0, -1])
+        self.assertEqual(down["hit"].tolist(), [True, False])
+        self.assertTrue(np.isnan(down["t"][1]))
+
+    def test_bad_shapes_and_rays_are_refused(self):
+        target = self.floor.target()
+        for words, call in {
+            "finite points of a shape": lambda: Shape.sphere([np.nan, 0, 0], 1),
+            "lengths of a shape of at least 0, got -1": lambda: Shape.sphere([0, 0, 0], -1),
+            "three numbers for the centre": lambda: Shape.sphere([0, 0], 1),
+            r"triangle, of shape \(3, 3\), got \(4, 3\)": lambda: Shape.triangle(np.zeros((4, 3))),
+            "at least one point of a hull": lambda: Shape.hull(np.zeros((0, 3))),
+            "rotation with uniform scale": lambda: Shape.box([1, 1, 1], np.diag([1.0, 2, 1, 1])),
+            "direction other than 0": lambda: target.cast([0, 0, 0], [0, 0, 0]),
+            "finite origin": lambda: target.cast([0, 0, np.inf], [0, 0, 1]),
+            "greatest length of rays": lambda: target.cast([0, 0, 0], [0, 0, 1], max=-1),
+            "finite radius of rays": lambda: target.cast([0, 0, 0], [0, 0, 1], radius=np.nan),
+            r"directions of shape \(3, 3\)": lambda: target.cast_each(np.zeros((3, 3)), np.ones((2, 3))),
+            "sequence of Shape": lambda: target.touch_each([1, 2]),
+            "reach of at least 0, got NaN": lambda: target.distance(Shape.sphere([0, 0, 0], 1), np.nan),
+        }.items():
+            with self.subTest(words), self.assertRaisesRegex(ValueError, words):
+                call()
+
+
+class Motions(unittest.TestCase):
+    def test_sweeps(self):
+        scan = dragon()
+        over = nearmiss.pose(translation=[[-0.3, 0.25, 0], [0.0, 0.25, 0], [0.3, 0.25, 0]])
+        free = nearmiss.sweep(scan, scan, over)
+        self.assertEqual((free.verdict, free.hits, free.t_free), ("free", False, 2.0))
+        self.assertGreater(free.clearance, 0)
+        into = nearmiss.sweep(scan, scan, nearmiss.pose(translation=[[-0.3, 0.02, 0], [0.05, 0.02, 0]]))
+        self.assertTrue(into.hits)
+        self.assertTrue(0 < into.t_free <= into.t_hit < 1)
+        self.assertEqual(nearmiss.sweep(scan, scan, over, work=5).reason, "budget")
+        with self.assertRaisesRegex(ValueError, "one scale along a path"):
+            changing = over.copy()
+            changing[1, :3, :3] *= 2
+            nearmiss.sweep(scan, scan, changing)
+        with self.assertRaisesRegex(ValueError, "margin"):
+            nearmiss.sweep(scan, scan, over, clearance=-1)
+
+    def test_worlds_find_what_pairs_find(self):
+        scan, at = dragon(), poses(7, 12, 0.2)
+        world = nearmiss.World()
+        ids = [world.insert(scan, pose) for pose in at]
+        pairs, answers = world.collide()
+        found = {tuple(pair): answer["verdict"] for pair, answer in zip(pairs.tolist(), answers)}
+        for i in range(12):
+            for j in range(i + 1, 12):
+                touches = scan.collide(scan, at[j], at[i]).touches
+                self.assertEqual(touches, found.get((ids[i], ids[j]), 0) == 1, (i, j))
+        world.move_to(ids[0], nearmiss.pose(translation=[9, 9, 9]))
+        self.assertEqual(world.near_pairs(of=[ids[0]]).shape, (0, 2))
+        world.remove(ids[1])
+        self.assertEqual((len(world), world.ids), (11, [ids[0], *ids[2:]]))
+        for call in (lambda: world.remove(ids[1]), lambda: world.move_to(99, np.eye(4))):
+            with self.assertRaises(KeyError):
+                call()
+        self.assertEqual(nearmiss.World().collide()[0].shape, (0, 2))
+
+    def test_slice_maps(self):
+        slices = nearmiss.SliceMap(room(), pixel=0.05)
+        boxes = [[[2, 1, 0.5], [4, 3, 1.5]], [[0, 1, 0.5], [0.3, 3, 1.5]]]
+        found = slices.query(boxes)
+        self.assertEqual(found["collides"].tolist(), [False, True])
+        self.assertAlmostEqual(found["floor"][0], 0.2, 1)
+        points, end, length = slices.route([1, 1, 0], [5, 3, 0.2])
+        self.assertTrue(4.4 < length < 6)
+        np.testing.assert_allclose(end[:2], [5, 3], atol=0.1)
+        places = slices.walk([1, 1, 0.01], points)
+        np.testing.assert_allclose(places[-1], end, atol=0.05)
+        self.assertIsNotNone(slices.standing([1, 1, 0]))
+        with self.assertRaisesRegex(ValueError, "nearest place to stand"):
+            slices.route([50, 1, 0], [5, 3, 0.2])
+        with tempfile.TemporaryDirectory() as folder:
+            slices.save(folder)
+            again = nearmiss.SliceMap.open(folder)
+            self.assertEqual(again.query(boxes).tolist(), found.tolist())
+            self.assertEqual((len(again), again.pixel), (len(slices), 0.05))
+        for words, call in {
+            "expected x, y, z.*got `w`": lambda: nearmiss.SliceMap(room(), up="w"),
+            r"boxes of shape \(N, 2, 3\)": lambda: slices.query([[1, 2, 3]]),
+            "min ≤ max": lambda: slices.query([[[1, 1, 1], [0, 0, 0]]]),
+            "got -1": lambda: nearmiss.SliceMap(room(), pixel=-1.0),
+        }.items():
+            with self.subTest(words), self.assertRaisesRegex(ValueError, words):
+                call()
+
+
+class Messages(unittest.TestCase):
+    def test_point_cloud2(self):
+        points = np.zeros((3, 4), dtype=[("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("pad", "u1", 4)])
+        points["x"] = np.arange(12).reshape(3, 4)
+        points["z"][1, 2] = np.nan
+        fields = [SimpleNamespace(name=n, offset=4 * i, datatype=7, count=1) for i, n in enumerate("xyz")]
+        message = SimpleNamespace(
+            height=3, width=4, fields=fields, is_bigendian=False, point_step=16, row_step=64,
+            data=points.tobytes(), is_dense=False,
+        )
+        self.assertEqual(nearmiss.point_cloud2(message).shape, (11, 3))
+        organised = nearmiss.point_cloud2(message, drop_invalid=False)
+        self.assertEqual(organised.shape, (3, 4, 3))
+        np.testing.assert_array_equal(organised[..., 0], points["x"])
+        for data in (bytearray(points.tobytes()), np.frombuffer(points.tobytes(), "u1"), memoryview(points.tobytes())):
+            message.data = data
+            self.assertEqual(nearmiss.point_cloud2(message).shape, (11, 3))
+        message.width = 5
+        with self.assertRaisesRegex(ValueError, "row_step of at least 80"):
+            nearmiss.point_cloud2(message)
+
+
+if __name__ == "__main__":
+    unittest.main()
