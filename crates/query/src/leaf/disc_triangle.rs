@@ -108,9 +108,13 @@ impl FlatDisc {
     }
 
     /// The share of the edge from `p` along `way` at which it is nearest to the disc.
+    ///
+    /// The zero of the derivative is found by false position. If an end stays twice, its value is halved
+    /// (the Illinois rule).
     pub(crate) fn nearest_share(&self, p: Vector3<f64>, way: Vector3<f64>) -> f64 {
-        /// Halvings to a rounding error.
         const ROUNDS: u32 = 60;
+        /// The error of a distance is of second order in that of the share.
+        const PRECISION: f64 = 1e-12;
         // Derivative of half the squared distance along the edge.
         let slope = |share: f64| {
             let x = p + way * share;
@@ -123,24 +127,24 @@ impl FlatDisc {
         if above <= 0.0 {
             return 1.0;
         }
-        for round in 0..ROUNDS {
-            // The secant's step is kept off the ends, and every third step halves.
-            let secant = low + (high - low) * (below / (below - above)).clamp(0.01, 0.99);
-            let middle = if round % 3 == 2 { 0.5 * (low + high) } else { secant };
-            if !(low < middle && middle < high) {
+        let (mut middle, mut was_below) = (low, None);
+        for _ in 0..ROUNDS {
+            let next = low + (high - low) * (below / (below - above));
+            let own = slope(next);
+            let change = (next - middle).abs();
+            middle = next;
+            if own == 0.0 || change <= PRECISION || high - low <= PRECISION {
                 break;
             }
-            let own = slope(middle);
-            if own == 0.0 {
-                return middle;
-            }
+            let share = if was_below == Some(own < 0.0) { 0.5 } else { 1.0 };
             if own < 0.0 {
-                (low, below) = (middle, own);
+                (low, below, above) = (middle, own, share * above);
             } else {
-                (high, above) = (middle, own);
+                (high, above, below) = (middle, own, share * below);
             }
+            was_below = Some(own < 0.0);
         }
-        0.5 * (low + high)
+        middle
     }
 }
 
