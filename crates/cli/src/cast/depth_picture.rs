@@ -94,7 +94,7 @@ pub(super) fn paint(target: &Target<'_>, viewer: &Viewer, name: &str) -> Picture
     let mut canvas = Canvas::new(COLUMNS * FINE + 2 * GAP, ROWS * FINE + 2 * GAP + LEGEND, GROUND);
     for (pixel, hit) in hits.iter().enumerate() {
         let tint = hit.map_or(NOTHING, |hit| {
-            let along = Vector3::from(viewer.ray(pixel).direction).dot(&hit.normal.into()).abs();
+            let along = Vector3::from(viewer.ray(pixel).direction).dot(&Vector3::from(hit.normal)).abs();
             shade(colour((hit.t - near) / (far - near)), GRAZING + (1.0 - GRAZING) * along)
         });
         let [left, top] = [GAP + pixel % COLUMNS * FINE, GAP + pixel / COLUMNS * FINE];

@@ -59,16 +59,23 @@ pub(crate) struct Body {
     pub(crate) velocity: Vector,
     pub(crate) spin: Vector,
     pub(crate) friction: f64,
+    /// The resistance to rolling: a length, by which the force of the ground is ahead of the contact.
+    pub(crate) rolling: f64,
     hint: ShapeHint,
     held: Vec<Held>,
     found: Vec<ShapeContact>,
 }
 
 impl Body {
-    pub(crate) fn new(kind: Kind, place: [f64; 3], turn: UnitQuaternion<f64>, friction: f64) -> Self {
+    pub(crate) fn new(
+        kind: Kind,
+        place: [f64; 3],
+        turn: UnitQuaternion<f64>,
+        [friction, rolling]: [f64; 2],
+    ) -> Self {
         let (velocity, spin, hint) = (Vector::zeros(), Vector::zeros(), ShapeHint::default());
         let (held, found) = (Vec::new(), Vec::new());
-        Self { kind, place: place.into(), turn, velocity, spin, friction, hint, held, found }
+        Self { kind, place: place.into(), turn, velocity, spin, friction, rolling, hint, held, found }
     }
 
     fn shape(&self) -> Shape<'static> {
@@ -115,7 +122,13 @@ impl Body {
             let impulse = frame[0] * impulses[0] + frame[1] * impulses[1] + frame[2] * impulses[2];
             self.push(&inverse, contact, impulse);
         }
+        let mut resisted = Vector::zeros();
         for _ in 0..ITERATIONS {
+            let load: f64 = held.iter().map(|held| held.impulses[0]).sum();
+            let wanted = resisted - axes * (self.kind.moments().component_mul(&(axes.transpose() * self.spin)));
+            let kept = wanted.cap_magnitude(self.rolling * load);
+            self.spin += inverse * (kept - resisted);
+            resisted = kept;
             for Held { contact, impulses } in &mut held {
                 let (frame, arm) = (frame(contact), Vector::from(contact.point) - self.place);
                 for axis in [1, 2, 0] {
