@@ -3,8 +3,8 @@
 //!
 //! `cargo run --release -p nearmiss --example crowd [SCAN [HEIGHT [COUNT]]]`, z up
 //!
-//! Each capsule falls and walks ahead, and is pushed out along the normals of its contacts. Where it is
-//! blocked it turns.
+//! Each capsule falls and walks ahead, and is pushed out along the normals of its contacts. Some times a
+//! second it looks ahead by a ray, and turns where there is no floor. Where it is blocked it turns, too.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::error::Error;
@@ -24,6 +24,10 @@ const STEP: f64 = 1.0 / 60.0;
 const SPEED: f64 = 1.4;
 const GRAVITY: f64 = 9.81;
 
+/// Steps between two looks ahead, and how far ahead they are.
+const LOOK: usize = 8;
+const AHEAD: f64 = 0.4;
+
 /// The least upward component of a normal on which one can stand: 50°.
 const STEEP: f64 = 0.64;
 
@@ -42,6 +46,13 @@ impl Walker {
         let radius = 0.15 * height;
         let [x, y, z] = self.foot;
         Shape::Capsule { ends: [self.foot, [x, y, z + height - 2.0 * radius]], radius }
+    }
+
+    /// Returns `true` if there is a floor ahead, at most half the height below.
+    fn sees_floor(&self, target: &Target<'_>, height: f64, scratch: &mut Scratch) -> bool {
+        let [x, y, z] = self.foot;
+        let place = [x + AHEAD * self.heading.cos(), y + AHEAD * self.heading.sin(), z];
+        target.is_hit(&Ray::new(place, [0.0, 0.0, -1.0]).with_max(0.65 * height), scratch)
     }
 }
 
@@ -67,9 +78,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{} capsules, {height} high, on {} points", walkers.len(), scan.len());
 
     let (mut contacts, mut total, mut longest) = (Vec::new(), Duration::ZERO, Duration::ZERO);
-    for _ in 0..STEPS {
+    for step in 0..STEPS as usize {
         let start = Instant::now();
-        for walker in &mut walkers {
+        for (number, walker) in walkers.iter_mut().enumerate() {
+            if (number + step).is_multiple_of(LOOK) && !walker.sees_floor(&target, height, &mut scratch) {
+                walker.heading = rng.random_range(0.0..TAU);
+            }
             let before = walker.foot;
             walker.fall += GRAVITY * STEP;
             let way = SPEED * STEP;

@@ -113,27 +113,35 @@ impl FlatDisc {
     /// (the Illinois rule).
     pub(crate) fn nearest_share(&self, p: Vector3<f64>, way: Vector3<f64>) -> f64 {
         const ROUNDS: u32 = 60;
-        /// The error of a distance is of second order in that of the share.
-        const PRECISION: f64 = 1e-12;
+        /// In disc radii. The error of a distance is of second order in that of the place.
+        const PRECISION: f64 = 1e-9;
+        let length = way.norm();
+        // Also if the edge is a point.
+        let per_radius = (self.radius / length).min(2.0);
+        // The nearest place of the disc is within its radius of the centre, and so are their feet.
+        let middle = ((self.centre - p).dot(&way) / (length * length)).clamp(0.0, 1.0);
+        let middle = if middle.is_nan() { 0.0 } else { middle };
+        let (mut low, mut high) = ((middle - per_radius).max(0.0), (middle + per_radius).min(1.0));
         // Derivative of half the squared distance along the edge.
         let slope = |share: f64| {
             let x = p + way * share;
             (x - self.nearest(&x)).dot(&way)
         };
-        let ((mut low, mut below), (mut high, mut above)) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
+        let (mut below, mut above) = (slope(low), slope(high));
         if below >= 0.0 {
-            return 0.0;
+            return low;
         }
         if above <= 0.0 {
-            return 1.0;
+            return high;
         }
+        let near = PRECISION * per_radius;
         let (mut middle, mut was_below) = (low, None);
         for _ in 0..ROUNDS {
             let next = low + (high - low) * (below / (below - above));
             let own = slope(next);
             let change = (next - middle).abs();
             middle = next;
-            if own == 0.0 || change <= PRECISION || high - low <= PRECISION {
+            if own == 0.0 || change <= near || high - low <= near {
                 break;
             }
             let share = if was_below == Some(own < 0.0) { 0.5 } else { 1.0 };
