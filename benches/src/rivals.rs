@@ -12,6 +12,7 @@ pub mod ours;
 pub mod parry;
 pub mod program;
 pub mod refit;
+pub mod solids;
 pub mod triangles;
 pub mod trimesh;
 

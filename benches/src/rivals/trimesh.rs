@@ -21,17 +21,22 @@ impl Shape {
     /// # Errors
     /// When parry rejects the mesh.
     pub fn new(mesh: &TriangleMesh) -> Result<Self, Failure> {
-        let vertices = mesh.vertices().iter().map(|&p| vector(p)).collect();
-        Ok(Self { mesh: TriMesh::new(vertices, mesh.triangles().to_vec())? })
+        Ok(Self { mesh: self::mesh(mesh)? })
     }
 }
 
+/// The mesh in single precision.
+pub(super) fn mesh(mesh: &TriangleMesh) -> Result<TriMesh, Failure> {
+    let vertices = mesh.vertices().iter().map(|&p| vector(p)).collect();
+    Ok(TriMesh::new(vertices, mesh.triangles().to_vec())?)
+}
+
 #[expect(clippy::cast_possible_truncation, reason = "the rival works in single precision")]
-fn vector(p: [f64; 3]) -> Vector {
+pub(super) fn vector(p: [f64; 3]) -> Vector {
     Vector::from_array(p.map(|x| x as f32))
 }
 
-fn placement(pose: &Pose) -> Placement {
+pub(super) fn placement(pose: &Pose) -> Placement {
     let column = |k: usize| vector(std::array::from_fn(|i| pose.rotation()[(i, k)]));
     let turn = Rotation::from_mat3(&Matrix::from_cols(column(0), column(1), column(2)));
     Placement::from_parts(vector(pose.translation()), turn)

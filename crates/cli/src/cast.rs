@@ -1,9 +1,12 @@
-//! `cast`: the first place where rays hit a scan.
+//! `cast`: the first place where rays hit a scan, and depth images.
+
+mod depth_picture;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::{CollideOptions, Ray, RayAnswer, Scratch, ShapePlan, Target};
+use nearmiss::slices::Up;
+use nearmiss::{CollideOptions, Detail, Ray, RayAnswer, Scratch, ShapePlan, Target};
 use serde::{Deserialize, Serialize};
 
 use crate::answer_report::word;
@@ -13,6 +16,9 @@ use crate::error::CliError;
 use crate::input::{Opening, TextLines};
 use crate::posing;
 use crate::preprocess::parse_threads;
+use crate::viewpoint::ViewArgs;
+use crate::{output, picture};
+use depth_picture::{Place, Viewer};
 
 /// Options of `cast`.
 #[derive(Debug, Clone, Args)]
@@ -23,8 +29,8 @@ pub struct CastArgs {
     ///
     /// `{"origin":[x,y,z],"direction":[x,y,z]}`, with `"max":d` for a ray that ends after the length d,
     /// and `"radius":r` for a ball that moves along the ray. Each ray gets one line of output, in order.
-    #[arg(long, value_name = "FILE.jsonl")]
-    pub rays: PathBuf,
+    #[arg(long, value_name = "FILE.jsonl", required_unless_present = "image")]
+    pub rays: Option<PathBuf>,
     /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose: Option<String>,
@@ -34,6 +40,21 @@ pub struct CastArgs {
     /// Check prepared scans in full before use: checksums, and every number
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
+    /// Draw a depth image as PNG: one ray for each pixel, coloured by its length
+    #[arg(long, value_name = "OUT.png", requires_all = ["from", "to"], help_heading = "Depth image")]
+    pub image: Option<PathBuf>,
+    /// Place of the camera
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "image", help_heading = "Depth image")]
+    pub from: Option<Place>,
+    /// Place that the camera looks at
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "image", help_heading = "Depth image")]
+    pub to: Option<Place>,
+    /// Width of the view in degrees, from 1 to 170
+    #[arg(long, value_name = "DEGREES", default_value_t = 75.0, value_parser = parse_angle, help_heading = "Depth image")]
+    pub angle: f64,
+    /// Axis that points up in the image: x, y, z, -x, -y or -z; by default z
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "image", help_heading = "Depth image")]
+    pub up: Option<Up>,
     /// Print one JSON object for each ray
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -53,18 +74,46 @@ struct CastReport {
     micros: f64,
 }
 
+/// Parses the width of a view.
+fn parse_angle(text: &str) -> Result<f64, String> {
+    let angle = text.parse().ok().filter(|angle| (1.0..=170.0).contains(angle));
+    angle.ok_or_else(|| "expected an angle from 1 to 170 degrees".into())
+}
+
 pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let matrix = posing::from_option("--pose", args.pose.as_deref())?;
-    let mut rays = RayFile::open(&args.rays)?;
+    let mut rays = args.rays.as_deref().map(RayFile::open).transpose()?;
+    if let Some(path) = &args.image {
+        let inputs = [Some(&args.scan), args.rays.as_ref()];
+        output::check_apart(path, &inputs.into_iter().flatten().map(PathBuf::as_path).collect::<Vec<_>>())?;
+        picture::check_name(path)?;
+    }
     let console = Console::new(args.quiet);
     let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
     let scan = opening.open(&args.scan)?;
     let pose = posing::of_object(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
-    let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
-    let target = Target::new(scan.at(&pose), &plan);
-    let unit = 0.01 * scan.sampling_radius() * pose.scale();
-    let (mut scratch, mut results) = (Scratch::default(), Results::new());
+    let mut results = Results::new();
+    if let Some(rays) = &mut rays {
+        let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
+        let unit = 0.01 * scan.sampling_radius() * pose.scale();
+        answer(args, (&Target::new(scan.at(&pose), &plan), unit), rays, &mut results)?;
+    }
+    if let Some(path) = &args.image {
+        let plan = ShapePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan)?;
+        draw(args, &Target::new(scan.at(&pose), &plan), (path, console))?;
+    }
+    results.flush()
+}
+
+/// Answers all rays of a file. Places are rounded to `unit`.
+fn answer(
+    args: &CastArgs,
+    (target, unit): (&Target<'_>, f64),
+    rays: &mut RayFile,
+    results: &mut Results,
+) -> Result<(), CliError> {
+    let mut scratch = Scratch::default();
     while let Some((line, text)) = rays.next_line()? {
         // Answers to the lines before a faulty one are written before the error.
         let ray = rays.ray(line, &text).or_else(|fault| results.flush().and(Err(fault)))?;
@@ -85,7 +134,21 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
             results.line(format_args!("line {line}: {}", sentence(&answer, unit)))?;
         }
     }
-    results.flush()
+    Ok(())
+}
+
+/// Draws the depth image.
+fn draw(args: &CastArgs, target: &Target<'_>, (path, console): (&Path, Console)) -> Result<(), CliError> {
+    let (Some(Place(eye)), Some(Place(place))) = (args.from, args.to) else { return Ok(()) };
+    let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
+    let viewer = Viewer::new(&view, target, [eye, place], args.angle).ok_or_else(|| {
+        CliError::Usage("--to: expected another place than --from, got the same; the camera looks at it".into())
+    })?;
+    let bar = console.spinner(format_args!("painting {}", path.display()));
+    let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let picture = depth_picture::paint(target, &viewer, &name);
+    drop(bar);
+    output::save_picture(&picture, path)
 }
 
 /// Returns the answer as a sentence. Places are rounded to `unit`.

@@ -10,6 +10,7 @@ mod invariance;
 mod moving_meshes;
 mod moving_scans;
 mod obstacles;
+mod resting;
 mod saved;
 mod saved_meshes;
 mod threads;

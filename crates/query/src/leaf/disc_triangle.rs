@@ -108,39 +108,51 @@ impl FlatDisc {
     }
 
     /// The share of the edge from `p` along `way` at which it is nearest to the disc.
+    ///
+    /// The zero of the derivative is found by false position. If an end stays twice, its value is halved
+    /// (the Illinois rule).
     pub(crate) fn nearest_share(&self, p: Vector3<f64>, way: Vector3<f64>) -> f64 {
-        /// Halvings to a rounding error.
         const ROUNDS: u32 = 60;
+        /// In disc radii. The error of a distance is of second order in that of the place.
+        const PRECISION: f64 = 1e-9;
+        let length = way.norm();
+        // Also if the edge is a point.
+        let per_radius = (self.radius / length).min(2.0);
+        // The nearest place of the disc is within its radius of the centre, and so are their feet.
+        let middle = ((self.centre - p).dot(&way) / (length * length)).clamp(0.0, 1.0);
+        let middle = if middle.is_nan() { 0.0 } else { middle };
+        let (mut low, mut high) = ((middle - per_radius).max(0.0), (middle + per_radius).min(1.0));
         // Derivative of half the squared distance along the edge.
         let slope = |share: f64| {
             let x = p + way * share;
             (x - self.nearest(&x)).dot(&way)
         };
-        let ((mut low, mut below), (mut high, mut above)) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
+        let (mut below, mut above) = (slope(low), slope(high));
         if below >= 0.0 {
-            return 0.0;
+            return low;
         }
         if above <= 0.0 {
-            return 1.0;
+            return high;
         }
-        for round in 0..ROUNDS {
-            // The secant's step is kept off the ends, and every third step halves.
-            let secant = low + (high - low) * (below / (below - above)).clamp(0.01, 0.99);
-            let middle = if round % 3 == 2 { 0.5 * (low + high) } else { secant };
-            if !(low < middle && middle < high) {
+        let near = PRECISION * per_radius;
+        let (mut middle, mut was_below) = (low, None);
+        for _ in 0..ROUNDS {
+            let next = low + (high - low) * (below / (below - above));
+            let own = slope(next);
+            let change = (next - middle).abs();
+            middle = next;
+            if own == 0.0 || change <= near || high - low <= near {
                 break;
             }
-            let own = slope(middle);
-            if own == 0.0 {
-                return middle;
-            }
+            let share = if was_below == Some(own < 0.0) { 0.5 } else { 1.0 };
             if own < 0.0 {
-                (low, below) = (middle, own);
+                (low, below, above) = (middle, own, share * above);
             } else {
-                (high, above) = (middle, own);
+                (high, above, below) = (middle, own, share * below);
             }
+            was_below = Some(own < 0.0);
         }
-        0.5 * (low + high)
+        middle
     }
 }
 

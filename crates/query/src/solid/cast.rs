@@ -125,7 +125,7 @@ pub(crate) fn crossings(
         most: f32::INFINITY,
         most_sq: f32::INFINITY,
         found,
-        is_doubtful: false,
+        is_doubtful: elements.of_separation(false) == Evidence::Estimated,
     };
     search.limit(ray.max);
     let from = search.from;
@@ -281,15 +281,23 @@ impl Cast<'_, '_> {
     /// The lanes of the points of a block that the ray passes within their reach.
     #[inline(always)]
     fn near<S: Simd>(&self, simd: S, first: usize, count: usize) -> u32 {
+        let arrays = &self.elements.arrays;
         let (mut positions, mut reaches) = ([[0.0; WIDTH]; 3], [0.0; WIDTH]);
-        for (lane, i) in (first..first + count).enumerate() {
-            let p = self.elements.arrays.position(i);
-            for k in 0..3 {
-                positions[k][lane] = p[k];
+        let is_block = first.is_multiple_of(WIDTH) && self.elements.semantics == Semantics::Obstacle;
+        let positions = if is_block {
+            reaches = arrays.obstacle_reaches(first / WIDTH);
+            &arrays.blocks[first / WIDTH].position
+        } else {
+            for (lane, i) in (first..first + count).enumerate() {
+                let p = arrays.position(i);
+                for k in 0..3 {
+                    positions[k][lane] = p[k];
+                }
+                reaches[lane] = self.elements.ray_reach(i);
             }
-            reaches[lane] = self.elements.ray_reach(i);
-        }
-        let [x, y, z] = &positions;
+            &positions
+        };
+        let [x, y, z] = positions;
         let [fx, fy, fz] = self.from;
         let d = [
             f32x16::load_array_ref(simd, x) - fx,

@@ -205,17 +205,24 @@ impl Gather<'_, '_> {
         if elements.is_doubtful(i) {
             return;
         }
-        let (gap, thick) = elements.gap(solid, i, elements.margin);
-        if gap.distance > solid.radius + elements.margin.max(thick) {
-            return;
-        }
+        let gap = || {
+            let (gap, thick) = elements.gap(solid, i, elements.margin);
+            (gap.distance <= solid.radius + elements.margin.max(thick)).then_some(gap)
+        };
         let found = match elements.element(i) {
-            Element::Ball(centre, radius) => of_ball(solid, &gap, (centre, radius)).map(|it| (it, false)),
+            Element::Ball(centre, radius) => {
+                gap().and_then(|gap| of_ball(solid, &gap, (centre, radius))).map(|it| (it, false))
+            }
             Element::Disc(disc) => {
                 let out = self.way_out(i, &disc);
                 let is_edge = elements.placed.scan().kind(i) == PointKind::Edge;
                 let is_behind = out.dot(&(self.inside - disc.centre)) < 0.0;
-                of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)).map(|it| (it, is_behind))
+                let place = if solid.crosses(&disc) {
+                    Some(deepest(solid, &disc, out))
+                } else {
+                    gap().and_then(|gap| of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)))
+                };
+                place.map(|it| (it, is_behind))
             }
         };
         let Some(((point, normal, depth), is_behind)) = found else { return };

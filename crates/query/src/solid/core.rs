@@ -160,26 +160,66 @@ impl<'a> Solid<'a> {
         [self.centre - along, self.centre + along]
     }
 
-    /// The lowest place, against `out`, of a core that is a segment within the cylinder over a disc with
-    /// that axis. `None` if the core is no segment, or is beside the cylinder.
+    /// The lowest place, against `out`, of a core that is a segment or a box within the cylinder over a
+    /// disc with that axis. `None` if the core is neither, or is beside the cylinder.
     pub(crate) fn lowest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-        if !matches!(self.core, Core::Segment) {
-            return None;
+        match self.core {
+            Core::Segment => lowest_of_edge(self.ends(), disc, out),
+            Core::Box => self.lowest_of_box(disc, out),
+            _ => None,
         }
-        let [p, q] = self.ends();
-        let across = |v: Vector| v - out * out.dot(&v);
-        let (from, way) = (across(p - disc.centre), across(q - p));
-        let (a, b) = (way.norm_squared(), from.dot(&way));
-        let c = from.norm_squared() - disc.radius * disc.radius;
-        let (low, high) = if a > 0.0 {
-            let root = (b * b - a * c).max(0.0).sqrt();
-            (((-b - root) / a).max(0.0), ((-b + root) / a).min(1.0))
-        } else {
-            (0.0, 1.0)
+    }
+
+    /// The lowest place of a box over a disc, if no corner below all others is. It is then above the rim:
+    /// on an edge, or where a face that looks down is lowest.
+    fn lowest_of_box(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
+        /// Slopes below this are level.
+        const LEVEL: f64 = 1e-12;
+        let mut best: Option<(f64, Vector)> = None;
+        let mut offer = |x: Vector| {
+            let height = out.dot(&x);
+            if best.is_none_or(|(least, _)| height < least) {
+                best = Some((height, x));
+            }
         };
-        let is_over = low <= high && (a == 0.0 && c <= 0.0 || b * b >= a * c);
-        let lower = if out.dot(&(q - p)) < 0.0 { high } else { low };
-        is_over.then(|| p + (q - p) * lower)
+        let rises = self.axes.map(|axis| axis.dot(out));
+        for k in 0..3 {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let along = self.axes[k] * self.half[k];
+            for [a, b] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
+                // Between two faces that look up.
+                if a * rises[i] > 0.0 && b * rises[j] > 0.0 {
+                    continue;
+                }
+                let middle =
+                    self.centre + self.axes[i] * (a * self.half[i]) + self.axes[j] * (b * self.half[j]);
+                lowest_of_edge([middle - along, middle + along], disc, out).into_iter().for_each(&mut offer);
+            }
+            if rises[k].abs() <= LEVEL {
+                continue;
+            }
+            // The face across axis k that looks down.
+            let normal = self.axes[k] * -1.0_f64.copysign(rises[k]);
+            let across = normal - out * normal.dot(out);
+            let slope = across.norm();
+            let rim = if slope > LEVEL { across * (disc.radius / slope) } else { Vector::zeros() };
+            let place = disc.centre - rim;
+            let height = normal.dot(&(place - self.centre - normal * self.half[k])) / rises[k].abs();
+            let x = place + out * height;
+            let is_on = |m: usize| self.axes[m].dot(&(x - self.centre)).abs() <= self.half[m];
+            if is_on(i) && is_on(j) {
+                offer(x);
+            }
+        }
+        best.map(|(_, x)| x)
+    }
+
+    /// Returns `true` if a core that is a segment or a box certainly crosses a disc.
+    pub(crate) fn crosses(&self, disc: &FlatDisc) -> bool {
+        let side = |out: Vector| {
+            self.lowest_over(disc, &out).is_some_and(|lowest| out.dot(&(lowest - disc.centre)) <= 0.0)
+        };
+        side(disc.normal) && side(-disc.normal)
     }
 
     /// The point of the core furthest along `d`.
@@ -292,6 +332,23 @@ impl<'a> Solid<'a> {
         let Closest { points, distance, lower } = closest(support, start, beyond);
         Closest { points: points.map(|p| p + centre), distance, lower }.into()
     }
+}
+
+/// The lowest place, against `out`, of a segment within the cylinder over a disc with that axis.
+fn lowest_of_edge([p, q]: [Vector; 2], disc: &FlatDisc, out: &Vector) -> Option<Vector> {
+    let across = |v: Vector| v - out * out.dot(&v);
+    let (from, way) = (across(p - disc.centre), across(q - p));
+    let (a, b) = (way.norm_squared(), from.dot(&way));
+    let c = from.norm_squared() - disc.radius * disc.radius;
+    let (low, high) = if a > 0.0 {
+        let root = (b * b - a * c).max(0.0).sqrt();
+        (((-b - root) / a).max(0.0), ((-b + root) / a).min(1.0))
+    } else {
+        (0.0, 1.0)
+    };
+    let is_over = low <= high && (a == 0.0 && c <= 0.0 || b * b >= a * c);
+    let lower = if out.dot(&(q - p)) < 0.0 { high } else { low };
+    is_over.then(|| p + (q - p) * lower)
 }
 
 /// An orthonormal frame whose first axis is `along`.

@@ -1,0 +1,142 @@
+//! A depth image of a scan: one ray for each pixel, coloured by the length of the ray.
+
+use std::ops::ControlFlow;
+use std::str::FromStr;
+
+use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss::{BatchScratch, Ray, RayHit, Target, each};
+use nearmiss_draw::canvas::{Area, Canvas, Colour, FINE, blend, shade};
+use nearmiss_draw::legend;
+use nearmiss_draw::picture::Picture;
+
+use crate::digits::{percent, short};
+use crate::picture::{GAP, GROUND, LEGEND};
+use crate::viewpoint::ViewArgs;
+
+/// Pixels of the image.
+const COLUMNS: usize = 1080;
+const ROWS: usize = 720;
+
+/// Colours from the nearest to the furthest hit, which colour-blind readers can tell apart.
+const DEPTHS: [Colour; 5] = [[253, 231, 76], [122, 209, 81], [34, 168, 132], [59, 82, 139], [68, 1, 84]];
+
+/// The colour of pixels whose rays hit nothing.
+const NOTHING: Colour = [228, 230, 234];
+
+/// The share of the colour that is kept where a ray grazes the surface.
+const GRAZING: f64 = 0.45;
+
+/// Share of the rays that may be shorter, or longer, than the range of colours.
+const OUTLYING: f64 = 0.01;
+
+/// A place in the world, as it is given on the command line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place(pub [f64; 3]);
+
+impl FromStr for Place {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Vec<f64> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
+        let place: Option<[f64; 3]> = numbers.try_into().ok();
+        let place = place.filter(|p| p.iter().all(|c| c.is_finite()) && text.matches(',').count() == 2);
+        place.map(Self).ok_or_else(|| "expected X,Y,Z in world units, such as 1.5,0,2".into())
+    }
+}
+
+/// A camera with one vanishing point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Viewer {
+    eye: Vector3<f64>,
+    /// To the right, up and ahead, for one unit of depth: to the border of the image.
+    axes: [Vector3<f64>; 3],
+}
+
+impl Viewer {
+    /// A camera at `eye` that looks at `place`, `angle` degrees wide, upright as `view` tells. `None` if
+    /// both places are equal.
+    pub(super) fn new(
+        view: &ViewArgs,
+        target: &Target<'_>,
+        [eye, place]: [[f64; 3]; 2],
+        angle: f64,
+    ) -> Option<Self> {
+        let eye = Vector3::from(eye);
+        let ahead = (Vector3::from(place) - eye).try_normalize(0.0)?;
+        let upright = view.upright([target.scan(), target.scan()]);
+        let up = upright.map_or_else(Vector3::z, |upright| upright.up());
+        let right = ahead.cross(&up).try_normalize(1e-9).unwrap_or_else(|| crate::picture::across(ahead));
+        let half = (0.5 * angle).to_radians().tan();
+        #[expect(clippy::cast_precision_loss, reason = "pixels")]
+        let tall = half * ROWS as f64 / COLUMNS as f64;
+        Some(Self { eye, axes: [right * half, right.cross(&ahead) * tall, ahead] })
+    }
+
+    /// The ray through the middle of a pixel, counted by rows from the top left.
+    #[expect(clippy::cast_precision_loss, reason = "pixels")]
+    fn ray(&self, pixel: usize) -> Ray {
+        let [x, y] = [
+            2.0 * ((pixel % COLUMNS) as f64 + 0.5) / COLUMNS as f64 - 1.0,
+            1.0 - 2.0 * ((pixel / COLUMNS) as f64 + 0.5) / ROWS as f64,
+        ];
+        let [right, up, ahead] = self.axes;
+        Ray::new(self.eye.into(), (ahead + right * x + up * y).normalize().into())
+    }
+}
+
+/// Casts a ray for each pixel, on all threads, and paints the image.
+pub(super) fn paint(target: &Target<'_>, viewer: &Viewer, name: &str) -> Picture {
+    let mut hits: Vec<Option<RayHit>> = vec![None; COLUMNS * ROWS];
+    let _all = each(&mut hits, None, &mut BatchScratch::default(), |pixel, scratch| {
+        ControlFlow::Continue(target.cast(&viewer.ray(pixel), scratch).hit)
+    });
+    let [near, far] = range(&hits);
+    let mut canvas = Canvas::new(COLUMNS * FINE + 2 * GAP, ROWS * FINE + 2 * GAP + LEGEND, GROUND);
+    for (pixel, hit) in hits.iter().enumerate() {
+        let tint = hit.map_or(NOTHING, |hit| {
+            let along = Vector3::from(viewer.ray(pixel).direction).dot(&Vector3::from(hit.normal)).abs();
+            shade(colour((hit.t - near) / (far - near)), GRAZING + (1.0 - GRAZING) * along)
+        });
+        let [left, top] = [GAP + pixel % COLUMNS * FINE, GAP + pixel / COLUMNS * FINE];
+        canvas.fill(Area { left, top, width: FINE, height: FINE }, tint);
+    }
+    let count = hits.iter().flatten().count();
+    let [left, top] = [GAP + 4 * FINE, ROWS * FINE + 2 * GAP + 4 * FINE];
+    let width = COLUMNS * FINE - 4 * FINE;
+    let depths = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| short(near + share * (far - near)));
+    let mut entries: Vec<(Option<Colour>, &str)> = vec![(None, "Length of the ray:")];
+    entries.extend(DEPTHS.iter().zip(&depths).map(|(&own, depth)| (Some(own), depth.as_str())));
+    entries.push((Some(NOTHING), "hits nothing"));
+    legend::entries(&mut canvas, [left, top], width, &entries);
+    #[expect(clippy::cast_precision_loss, reason = "pixels")]
+    let share = count as f64 / hits.len() as f64;
+    let told = format!("{name}: {} of the rays hit. Darker where they graze the surface.", percent(share));
+    legend::sentence(&mut canvas, [left, top + legend::LINE], width, &told);
+    canvas.picture()
+}
+
+/// The lengths of the rays that have the first and the last colour.
+fn range(hits: &[Option<RayHit>]) -> [f64; 2] {
+    let mut lengths: Vec<f64> = hits.iter().flatten().map(|hit| hit.t).collect();
+    lengths.sort_unstable_by(f64::total_cmp);
+    let (Some(&first), Some(&last)) = (lengths.first(), lengths.last()) else { return [0.0, 1.0] };
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a count"
+    )]
+    let off = (OUTLYING * lengths.len() as f64) as usize;
+    let [near, far] = [lengths[off], lengths[lengths.len() - 1 - off]];
+    if far > near { [near, far] } else { [first, last.max(first + f64::MIN_POSITIVE)] }
+}
+
+/// Returns the colour of a share of the range.
+fn colour(share: f64) -> Colour {
+    let place = 4.0 * if share.is_finite() { share.clamp(0.0, 1.0) } else { 1.0 };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 3")]
+    let step = (place as usize).min(3);
+    #[expect(clippy::cast_precision_loss, reason = "0 to 3")]
+    let within = place - step as f64;
+    blend(DEPTHS[step], DEPTHS[step + 1], within)
+}
