@@ -87,7 +87,11 @@ impl SweepAnswer {
 /// # Safety
 /// `poses` are `count` poses; `out` is null or valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nearmiss_motion_new(poses: *const Pose, count: usize, out: Out<'_, Motion>) -> Status {
+pub unsafe extern "C" fn nearmiss_motion_new(
+    poses: *const Pose,
+    count: usize,
+    out: Out<'_, Motion>,
+) -> Status {
     guard(|| {
         make(out, || {
             // SAFETY: the caller promises the poses.

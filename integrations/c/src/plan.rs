@@ -33,14 +33,16 @@ pub extern "C" fn nearmiss_plan_new(
 ) -> Status {
     guard(|| {
         make(out, || {
-            let (options, a, b) = (options.copied().unwrap_or_else(|| nearmiss_options()), get(a, "a")?, get(b, "b")?);
+            let (options, a, b) =
+                (options.copied().unwrap_or_else(|| nearmiss_options()), get(a, "a")?, get(b, "b")?);
             let mut asked = options.collide()?;
             if a.metric() == nearmiss::Metric::Geodesic && options.semantics == 0 {
                 asked = asked.with_semantics(nearmiss::Semantics::Surface);
             }
             let distance =
                 DistanceOptions::default().with_semantics(asked.semantics).with_relative(options.relative);
-            let sweep = SweepOptions::default().with_semantics(asked.semantics).with_clearance(options.margin);
+            let sweep =
+                SweepOptions::default().with_semantics(asked.semantics).with_clearance(options.margin);
             Ok(Plans {
                 collide: CollidePlan::new(&asked, a, b).map_err(Failure::argument)?,
                 distance: DistancePlan::new(&distance, a, b).map_err(Failure::argument)?,

@@ -3,8 +3,8 @@
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
 
-use nearmiss::store::{ContainerFault, OpenError, WriteError};
 use nearmiss::io::ReadError;
+use nearmiss::store::{ContainerFault, OpenError, WriteError};
 use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud};
 
 use crate::handle::{Out, free, get, make, opaque};
@@ -174,7 +174,9 @@ fn check(checks: i32) -> Result<Check, Failure> {
     match checks {
         0 => Ok(Check::Full),
         1 => Ok(Check::Structure),
-        other => Err(Failure::argument(format_args!("expected checks of 0 (full) or 1 (structure), got {other}"))),
+        other => {
+            Err(Failure::argument(format_args!("expected checks of 0 (full) or 1 (structure), got {other}")))
+        }
     }
 }
 
@@ -248,7 +250,10 @@ pub unsafe extern "C" fn nearmiss_scan_to_bytes(
 
 /// Writes facts about a scan to `out`. Thread safety: any thread.
 #[unsafe(no_mangle)]
-pub extern "C" fn nearmiss_scan_about(scan: Option<&Scan>, out: Option<&mut MaybeUninit<ScanAbout>>) -> Status {
+pub extern "C" fn nearmiss_scan_about(
+    scan: Option<&Scan>,
+    out: Option<&mut MaybeUninit<ScanAbout>>,
+) -> Status {
     guard(|| {
         let scan = get(scan, "scan")?;
         let (bounds, dropped) = (scan.bounds(), scan.dropped());

@@ -61,7 +61,8 @@ pub(crate) fn unloaded(cause: Unloaded) -> Failure {
 }
 
 fn unstored(cause: StoreError) -> Failure {
-    let is_of_system = matches!(cause, StoreError::Folder { .. } | StoreError::Write(_) | StoreError::Busy { .. });
+    let is_of_system =
+        matches!(cause, StoreError::Folder { .. } | StoreError::Write(_) | StoreError::Busy { .. });
     Failure::new(if is_of_system { Status::Io } else { Status::Data }, cause)
 }
 
@@ -91,7 +92,8 @@ pub unsafe extern "C" fn nearmiss_map_from_points(
             }
             if !given.up.is_null() {
                 // SAFETY: the caller promises the text.
-                options = options.with_up(unsafe { text(given.up, "up") }?.parse().map_err(Failure::argument)?);
+                options =
+                    options.with_up(unsafe { text(given.up, "up") }?.parse().map_err(Failure::argument)?);
             }
             let finite = points.iter().filter(|p| p.iter().all(|c| c.is_finite())).copied();
             let plan = SlicePlan::new(&options, &Aabb::of(finite)).map_err(Failure::argument)?;
@@ -155,6 +157,9 @@ pub extern "C" fn nearmiss_map_query(
         }
         let found = map.query(&Aabb { min, max }, Floor::Max).map_err(unloaded)?;
         let floor = found.floor.unwrap_or(NONE);
-        write(out, Occupancy { collides: found.collides, obstacle: found.obstacle, pixels: found.pixels, floor })
+        write(
+            out,
+            Occupancy { collides: found.collides, obstacle: found.obstacle, pixels: found.pixels, floor },
+        )
     })
 }

@@ -91,7 +91,8 @@ pub extern "C" fn nearmiss_walker_step(
     out: Option<&mut MaybeUninit<Step>>,
 ) -> Status {
     guard(|| {
-        let (walker, map, target) = (get_mut(walker, "walker")?, get(map, "map")?, *required(target, "target")?);
+        let (walker, map, target) =
+            (get_mut(walker, "walker")?, get(map, "map")?, *required(target, "target")?);
         if !target.iter().all(|c| c.is_finite()) {
             return Err(Failure::argument(format_args!("expected a finite target, got {target:?}")));
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use parry3d::bounding_volume::{Aabb, BoundingSphere};
 use parry3d::mass_properties::MassProperties;
-use parry3d::math::{Real, Vector};
+use parry3d::math::{Mat3, Real, Vector};
 use parry3d::query::{PointProjection, PointQuery, Ray as ParryRay, RayCast, RayIntersection};
 use parry3d::shape::{FeatureId, Shape as ParryShape, ShapeType, SharedShape, TypedShape};
 
@@ -77,8 +77,25 @@ impl ScanShape {
         Self(Arc::new(Inner { pose: *pose, bounds, ..Arc::unwrap_or_clone(self.0) }))
     }
 
+    /// The same shape with the mass properties of the solid that the scan encloses
+    /// ([`Target::moments`] with 64 lines: some 50 ms). `None` if it encloses none, or has holes for
+    /// more than a twentieth of the lines.
+    #[must_use]
+    pub fn solid(self) -> Option<Self> {
+        /// Lines along each of two axes.
+        const LINES: u16 = 64;
+        /// The greatest share of lines through holes.
+        const OPEN: f64 = 0.05;
+        let moments = with_scratch(|scratch| self.target().moments(LINES, scratch))?;
+        let [x, y, z] = moments.inertia.map(to_vector);
+        let centre = to_vector(moments.centre);
+        let inertia = Mat3::from_cols(x, y, z);
+        let mass = MassProperties::with_inertia_matrix(centre, to_real(moments.volume), inertia);
+        (moments.open <= OPEN).then(|| self.with_mass(mass))
+    }
+
     /// The same shape with the mass properties of a solid of density one, in the frame of the shape.
-    /// A scan is a surface; without this call it has no mass, as a triangle mesh that is not closed.
+    /// A scan is a surface; without this call or [`Self::solid`] it has no mass.
     #[must_use]
     pub fn with_mass(self, of_density_one: MassProperties) -> Self {
         Self(Arc::new(Inner { mass: of_density_one, ..Arc::unwrap_or_clone(self.0) }))

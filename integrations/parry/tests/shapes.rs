@@ -264,3 +264,32 @@ fn scans_meet_scans_and_scale() {
     assert!((distance.expect("supported").distance - 0.4).abs() < 1e-3, "the scaled floor is below");
     assert!(floor.scale_dyn(Vector::new(1.0, 2.0, 1.0), 0).is_none(), "not uniform");
 }
+
+#[test]
+fn a_closed_scan_weighs_as_its_mesh() {
+    let dragon = nearmiss_testdata::dragon::dragon_mesh(nearmiss_testdata::dragon::Dragon::Points23k);
+    let dragon = dragon.expect("the dragon");
+    let cloud = PointCloud::from_positions(dragon.vertices()).expect("points");
+    let scan = Scan::build(&cloud, &BuildOptions::default()).expect("a scan");
+    let shape = ScanShape::new(scan).expect("for shapes").solid().expect("it is closed");
+    #[expect(clippy::cast_possible_truncation, reason = "parry computes in single precision")]
+    let vertices: Vec<_> =
+        dragon.vertices().iter().map(|v| Vector::from_array(v.map(|c| c as f32))).collect();
+    let exact = parry3d::mass_properties::MassProperties::from_trimesh(1.0, &vertices, dragon.triangles());
+    let ours = shape.mass_properties(1.0);
+    let share = ours.mass() / exact.mass();
+    assert!((share - 1.0).abs() < 0.02, "{} of the mass", share);
+    let size = shape.compute_local_aabb().half_extents().length();
+    let away = (ours.local_com - exact.local_com).length();
+    assert!(away < 0.01 * size, "the centre of mass is {away} beside");
+    let sorted = |it: Vector| {
+        let mut it = it.to_array();
+        it.sort_by(f32::total_cmp);
+        it
+    };
+    let [ours, exact] = [ours, exact].map(|it| sorted(it.principal_inertia()));
+    for (a, b) in ours.iter().zip(exact) {
+        assert!((a / b - 1.0).abs() < 0.03, "{ours:?} and {exact:?}");
+    }
+    assert!(floor().solid().is_none(), "a floor encloses nothing");
+}

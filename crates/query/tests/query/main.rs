@@ -17,6 +17,7 @@ mod margin;
 mod mesh_scans;
 mod mesh_worlds;
 mod meshes;
+mod moments;
 mod orders;
 mod outputs;
 mod penetration;
