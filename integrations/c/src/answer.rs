@@ -122,9 +122,20 @@ impl Answer {
         };
         match answer.verdict {
             Found::Intersecting { contact, evidence: certainty } => {
-                let Contact { point, normal_a, normal_b, residual, source_a, source_b } = Contact::new(&contact);
+                let Contact { point, normal_a, normal_b, residual, source_a, source_b } =
+                    Contact::new(&contact);
                 let (verdict, evidence) = (Verdict::Touching, evidence(certainty));
-                Self { verdict, evidence, witness: point, normal_a, normal_b, residual, source_a, source_b, ..none }
+                Self {
+                    verdict,
+                    evidence,
+                    witness: point,
+                    normal_a,
+                    normal_b,
+                    residual,
+                    source_a,
+                    source_b,
+                    ..none
+                }
             }
             Found::Separated { gap, evidence: certainty } => {
                 let gap = if certainty == nearmiss::Evidence::Certified { gap } else { NONE };

@@ -1,10 +1,11 @@
 //! Messages of ROS.
 
 use std::ffi::c_char;
+use std::mem::MaybeUninit;
 
 use nearmiss::io::{PointCloud2, PointCloud2View, PointField};
 
-use crate::handle::{Out, make};
+use crate::handle::make;
 use crate::pointer::{required, slice, text};
 use crate::scan::{PrepareOptions, Scan, nearmiss_prepare_options, prepare};
 use crate::status::{Failure, Status, guard};
@@ -56,7 +57,7 @@ pub struct Message {
 pub unsafe extern "C" fn nearmiss_scan_from_point_cloud2(
     message: Option<&Message>,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {

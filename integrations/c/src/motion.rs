@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 use nearmiss::{Prepared as _, Sweep, SweepReason, SweepVerdict};
 
 use crate::answer::{Contact, NONE, NOWHERE, Reason, Verdict, evidence};
-use crate::handle::{Out, free, get, get_mut, make, opaque};
+use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::options::{Budget, Evidence, budget};
 use crate::plan::Plan;
 use crate::pointer::{slice, write};
@@ -14,10 +14,11 @@ use crate::scan::Scan;
 use crate::scratch::Scratch;
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// A motion through poses. Any number of threads may use one at the same time.
-    Motion of nearmiss::Motion as b"nm-motio"
-}
+/// A motion through poses. Any number of threads may use one at the same time.
+#[derive(Debug)]
+pub struct Motion(Handle<nearmiss::Motion>);
+
+opaque!(Motion of nearmiss::Motion as b"nm-motio");
 
 /// The answer about a motion. Missing numbers are NaN. Times count poses, with fractions.
 #[derive(Debug, Clone, Copy)]
@@ -87,7 +88,11 @@ impl SweepAnswer {
 /// # Safety
 /// `poses` are `count` poses; `out` is null or valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nearmiss_motion_new(poses: *const Pose, count: usize, out: Out<'_, Motion>) -> Status {
+pub unsafe extern "C" fn nearmiss_motion_new(
+    poses: *const Pose,
+    count: usize,
+    out: Option<&mut MaybeUninit<*mut Motion>>,
+) -> Status {
     guard(|| {
         make(out, || {
             // SAFETY: the caller promises the poses.

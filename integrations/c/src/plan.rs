@@ -1,8 +1,9 @@
 //! Plans: validated options.
 
 use nearmiss::{CollidePlan, DistanceOptions, DistancePlan, ShapePlan, SweepOptions, SweepPlan};
+use std::mem::MaybeUninit;
 
-use crate::handle::{Out, free, get, make, opaque};
+use crate::handle::{Handle, free, get, make, opaque};
 use crate::options::{Options, nearmiss_options};
 use crate::scan::Scan;
 use crate::status::{Failure, Status, guard};
@@ -16,11 +17,12 @@ pub(crate) struct Plans {
     pub(crate) sweep: SweepPlan,
 }
 
-opaque! {
-    /// Validated options. A plan serves every question, about any scans prepared in the same way as
-    /// those that it was made for, in any poses. Any number of threads may use one at the same time.
-    Plan of Plans as b"nm-plan."
-}
+/// Validated options. A plan serves every question, about any scans prepared in the same way as
+/// those that it was made for, in any poses. Any number of threads may use one at the same time.
+#[derive(Debug)]
+pub struct Plan(Handle<Plans>);
+
+opaque!(Plan of Plans as b"nm-plan.");
 
 /// Validates options, for `a` and `b` and all scans prepared for the same kernel. `options` may be
 /// null. Thread safety: any thread.
@@ -29,18 +31,20 @@ pub extern "C" fn nearmiss_plan_new(
     options: Option<&Options>,
     a: Option<&Scan>,
     b: Option<&Scan>,
-    out: Out<'_, Plan>,
+    out: Option<&mut MaybeUninit<*mut Plan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
-            let (options, a, b) = (options.copied().unwrap_or_else(|| nearmiss_options()), get(a, "a")?, get(b, "b")?);
+            let (options, a, b) =
+                (options.copied().unwrap_or_else(|| nearmiss_options()), get(a, "a")?, get(b, "b")?);
             let mut asked = options.collide()?;
             if a.metric() == nearmiss::Metric::Geodesic && options.semantics == 0 {
                 asked = asked.with_semantics(nearmiss::Semantics::Surface);
             }
             let distance =
                 DistanceOptions::default().with_semantics(asked.semantics).with_relative(options.relative);
-            let sweep = SweepOptions::default().with_semantics(asked.semantics).with_clearance(options.margin);
+            let sweep =
+                SweepOptions::default().with_semantics(asked.semantics).with_clearance(options.margin);
             Ok(Plans {
                 collide: CollidePlan::new(&asked, a, b).map_err(Failure::argument)?,
                 distance: DistancePlan::new(&distance, a, b).map_err(Failure::argument)?,

@@ -36,7 +36,9 @@ pub(crate) unsafe fn slice<'a, T>(first: *const T, count: usize, name: &str) -> 
         return Err(Failure::null(name));
     }
     if !first.is_aligned() || count > most::<T>() {
-        return Err(Failure::argument(format_args!("expected {name} of {count} aligned values, got another pointer")));
+        return Err(Failure::argument(format_args!(
+            "expected {name} of {count} aligned values, got another pointer"
+        )));
     }
     // SAFETY: it is not null, aligned and not too long; the caller promises the values.
     Ok(unsafe { std::slice::from_raw_parts(first, count) })
@@ -61,7 +63,9 @@ pub(crate) unsafe fn fill<T>(
         return Err(Failure::null("out"));
     }
     if !first.is_aligned() || capacity > most::<T>() {
-        return Err(Failure::argument(format_args!("expected {capacity} aligned places, got another pointer")));
+        return Err(Failure::argument(format_args!(
+            "expected {capacity} aligned places, got another pointer"
+        )));
     }
     for (i, value) in values.take(capacity).enumerate() {
         // SAFETY: `i` is below `capacity`, so the place is one of those that the caller promises.

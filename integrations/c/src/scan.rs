@@ -3,18 +3,19 @@
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
 
-use nearmiss::store::{ContainerFault, OpenError, WriteError};
 use nearmiss::io::ReadError;
+use nearmiss::store::{ContainerFault, OpenError, WriteError};
 use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud};
 
-use crate::handle::{Out, free, get, make, opaque};
+use crate::handle::{Handle, free, get, make, opaque};
 use crate::pointer::{fill, path, slice, write};
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// A prepared scan. Any number of threads may use one at the same time.
-    Scan of nearmiss::Scan as b"nm-scan."
-}
+/// A prepared scan. Any number of threads may use one at the same time.
+#[derive(Debug)]
+pub struct Scan(Handle<nearmiss::Scan>);
+
+opaque!(Scan of nearmiss::Scan as b"nm-scan.");
 
 /// How a scan is prepared. Start from `nearmiss_prepare_options`.
 #[derive(Debug, Clone, Copy)]
@@ -107,7 +108,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_points(
     points: *const f64,
     count: usize,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -126,7 +127,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_floats(
     points: *const f32,
     count: usize,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -145,7 +146,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_floats(
 pub unsafe extern "C" fn nearmiss_scan_read(
     file: *const c_char,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -174,7 +175,9 @@ fn check(checks: i32) -> Result<Check, Failure> {
     match checks {
         0 => Ok(Check::Full),
         1 => Ok(Check::Structure),
-        other => Err(Failure::argument(format_args!("expected checks of 0 (full) or 1 (structure), got {other}"))),
+        other => {
+            Err(Failure::argument(format_args!("expected checks of 0 (full) or 1 (structure), got {other}")))
+        }
     }
 }
 
@@ -184,7 +187,11 @@ fn check(checks: i32) -> Result<Check, Failure> {
 /// # Safety
 /// `file` is null or text that ends with a zero byte; `out` is null or valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nearmiss_scan_open(file: *const c_char, checks: i32, out: Out<'_, Scan>) -> Status {
+pub unsafe extern "C" fn nearmiss_scan_open(
+    file: *const c_char,
+    checks: i32,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
+) -> Status {
     guard(|| {
         make(out, || {
             // SAFETY: the caller promises the text.
@@ -203,7 +210,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_bytes(
     bytes: *const u8,
     length: usize,
     checks: i32,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -248,7 +255,10 @@ pub unsafe extern "C" fn nearmiss_scan_to_bytes(
 
 /// Writes facts about a scan to `out`. Thread safety: any thread.
 #[unsafe(no_mangle)]
-pub extern "C" fn nearmiss_scan_about(scan: Option<&Scan>, out: Option<&mut MaybeUninit<ScanAbout>>) -> Status {
+pub extern "C" fn nearmiss_scan_about(
+    scan: Option<&Scan>,
+    out: Option<&mut MaybeUninit<ScanAbout>>,
+) -> Status {
     guard(|| {
         let scan = get(scan, "scan")?;
         let (bounds, dropped) = (scan.bounds(), scan.dropped());

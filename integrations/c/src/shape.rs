@@ -124,7 +124,9 @@ impl Shape {
         let Self { pose, half, radius, rounding, corners, .. } = *self;
         let lengths = [half[0], half[1], half[2], radius, rounding];
         if let Some(wrong) = lengths.iter().find(|&&l| !(l >= 0.0 && l.is_finite())) {
-            return Err(Failure::argument(format_args!("expected finite lengths of at least 0, got {wrong}")));
+            return Err(Failure::argument(format_args!(
+                "expected finite lengths of at least 0, got {wrong}"
+            )));
         }
         let are_finite = |points: &[[f64; 3]]| points.iter().flatten().all(|c| c.is_finite());
         let not_finite = || Failure::argument("expected finite points of a shape, got NaN or infinity");
@@ -150,7 +152,11 @@ impl Shape {
                 }
                 Convex::Hull { points, radius: rounding }
             }
-            other => return Err(Failure::argument(format_args!("expected a kind of shape of 0 to 6, got {other}"))),
+            other => {
+                return Err(Failure::argument(format_args!(
+                    "expected a kind of shape of 0 to 6, got {other}"
+                )));
+            }
         })
     }
 }

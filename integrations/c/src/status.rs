@@ -71,7 +71,10 @@ pub(crate) fn guard(work: impl FnOnce() -> Result<(), Failure>) -> Status {
         Err(cause) => {
             let text = cause.downcast_ref::<String>().map(String::as_str);
             let text = text.or_else(|| cause.downcast_ref::<&str>().copied()).unwrap_or("unknown");
-            keep(Failure::new(Status::Fault, format_args!("a fault of the library: {text}; please report it")))
+            keep(Failure::new(
+                Status::Fault,
+                format_args!("a fault of the library: {text}; please report it"),
+            ))
         }
     }
 }

@@ -152,7 +152,14 @@ impl RayHit {
     fn new(answer: &nearmiss::RayAnswer) -> Self {
         let certainty = evidence(answer.evidence);
         answer.hit.map_or(
-            Self { hit: false, evidence: certainty, source: NOBODY, t: NONE, point: NOWHERE, normal: NOWHERE },
+            Self {
+                hit: false,
+                evidence: certainty,
+                source: NOBODY,
+                t: NONE,
+                point: NOWHERE,
+                normal: NOWHERE,
+            },
             |hit| Self {
                 hit: true,
                 evidence: certainty,
@@ -338,9 +345,10 @@ pub unsafe extern "C" fn nearmiss_cast_all(
         let (target, memory) = (target(plan, scan)?, get_mut(scratch, "scratch")?);
         let ray = required(ray, "ray")?.checked()?;
         target.cast_all(&ray, &mut memory.hits, &mut memory.scratch);
-        let hits = memory.hits.iter().map(|hit| {
-            RayHit::new(&nearmiss::RayAnswer { hit: Some(*hit), evidence: hit.evidence })
-        });
+        let hits = memory
+            .hits
+            .iter()
+            .map(|hit| RayHit::new(&nearmiss::RayAnswer { hit: Some(*hit), evidence: hit.evidence }));
         // SAFETY: the caller promises the places.
         unsafe { fill(hits, (out, capacity), count) }
     })

@@ -5,15 +5,16 @@ use std::mem::MaybeUninit;
 use nearmiss::slices::{AvatarOptions, Route, Slide, Walker as Walking};
 
 use crate::answer::NONE;
-use crate::handle::{Out, free, get, get_mut, make, opaque};
+use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::pointer::{fill, required, write};
 use crate::slices::{SliceMap, unloaded};
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// An avatar somewhere in a map.
-    Walker of Walking as b"nm-walke"
-}
+/// An avatar somewhere in a map.
+#[derive(Debug)]
+pub struct Walker(Handle<Walking>);
+
+opaque!(Walker of Walking as b"nm-walke");
 
 /// The size of an avatar. Start from `nearmiss_avatar`.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +62,7 @@ pub extern "C" fn nearmiss_walker_new(
     map: Option<&SliceMap>,
     size: Option<&Avatar>,
     start: Option<&[f64; 3]>,
-    out: Out<'_, Walker>,
+    out: Option<&mut MaybeUninit<*mut Walker>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -91,7 +92,8 @@ pub extern "C" fn nearmiss_walker_step(
     out: Option<&mut MaybeUninit<Step>>,
 ) -> Status {
     guard(|| {
-        let (walker, map, target) = (get_mut(walker, "walker")?, get(map, "map")?, *required(target, "target")?);
+        let (walker, map, target) =
+            (get_mut(walker, "walker")?, get(map, "map")?, *required(target, "target")?);
         if !target.iter().all(|c| c.is_finite()) {
             return Err(Failure::argument(format_args!("expected a finite target, got {target:?}")));
         }

@@ -3,7 +3,10 @@
 use nearmiss::{Evidence, Reason, Verdict};
 use pyo3::prelude::*;
 
-use crate::codes::{NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, verdict_name, number, plain, reason_code, reason_name, shown, undecided, vector};
+use crate::codes::{
+    NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, number, plain,
+    reason_code, reason_name, shown, undecided, vector, verdict_name,
+};
 use crate::record::record;
 
 record! {
@@ -55,7 +58,17 @@ impl AnswerRecord {
                 let [source_a, source_b] = contact.sources.map(|source| i64::from(source.0));
                 let (witness, residual) = (contact.point, contact.residual);
                 let evidence = evidence_code(evidence);
-                Self { verdict: 1, witness, normal_a, normal_b, residual, source_a, source_b, evidence, ..none }
+                Self {
+                    verdict: 1,
+                    witness,
+                    normal_a,
+                    normal_b,
+                    residual,
+                    source_a,
+                    source_b,
+                    evidence,
+                    ..none
+                }
             }
             Verdict::Separated { gap, evidence } => {
                 let gap = if evidence == Evidence::Certified { gap } else { NONE };
@@ -200,4 +213,3 @@ impl ManifoldRecord {
         Self { point: place.point, normal: place.normal, gap: place.gap, source_a, source_b }
     }
 }
-

@@ -34,7 +34,9 @@ pub(crate) fn doubles<'py>(
     // Booleans, text and objects are not coordinates, although some convert.
     let (Ok(array), "f" | "i" | "u") = (array, kind.as_str()) else {
         let class = given.get_type().name().map_or_else(|_| String::new(), |name| name.to_string());
-        return Err(refused(format!("expected {expected}, got {class} without numbers; give an array of floats")));
+        return Err(refused(format!(
+            "expected {expected}, got {class} without numbers; give an array of floats"
+        )));
     };
     let array = array.call_method1("astype", ("float64",))?;
     numpy(given.py())?.call_method1("ascontiguousarray", (array,))?.extract().map_err(Into::into)
@@ -64,11 +66,15 @@ impl<'py> Points<'py> {
         let made = match self {
             Self::Single(array) => {
                 let (points, _) = array.as_slice().map_err(refused)?.as_chunks::<3>();
-                py.detach(|| if drops { PointCloud::cleaned(points) } else { PointCloud::from_positions(points) })
+                py.detach(|| {
+                    if drops { PointCloud::cleaned(points) } else { PointCloud::from_positions(points) }
+                })
             }
             Self::Double(array) => {
                 let (points, _) = array.as_slice().map_err(refused)?.as_chunks::<3>();
-                py.detach(|| if drops { PointCloud::cleaned(points) } else { PointCloud::from_positions(points) })
+                py.detach(|| {
+                    if drops { PointCloud::cleaned(points) } else { PointCloud::from_positions(points) }
+                })
             }
         };
         made.map_err(|cause| match cause {

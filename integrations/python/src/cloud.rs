@@ -45,9 +45,13 @@ impl<'py> Data<'py> {
         if let Ok(bytes) = given.cast::<PyBytes>() {
             return Ok(Self::Bytes(bytes.clone()));
         }
-        let expected =
-            || refused("expected the data of the message as bytes, an array of uint8 or a buffer; pass `message.data`");
-        let array = given.py().import("numpy")?.call_method1("frombuffer", (given, "u1")).map_err(|_| expected())?;
+        let expected = || {
+            refused(
+                "expected the data of the message as bytes, an array of uint8 or a buffer; pass `message.data`",
+            )
+        };
+        let array =
+            given.py().import("numpy")?.call_method1("frombuffer", (given, "u1")).map_err(|_| expected())?;
         Ok(Self::Array(array.extract().map_err(|_| expected())?))
     }
 

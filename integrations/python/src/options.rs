@@ -81,7 +81,9 @@ impl Options {
                     "verdict" => Detail::Verdict,
                     "witness" => Detail::Witness,
                     other => {
-                        return Err(refused(format!("expected detail `verdict` or `witness`, got `{other}`")));
+                        return Err(refused(format!(
+                            "expected detail `verdict` or `witness`, got `{other}`"
+                        )));
                     }
                 });
             }

@@ -84,7 +84,9 @@ pub(crate) fn ask_each<T: Zeroable + Copy + Send>(
         let scratch = &mut scratch;
         py.detach(|| {
             in_pool(|| {
-                each(answers, None, scratch, |i, scratch| ControlFlow::Continue(ask(part * PART + i, scratch)))
+                each(answers, None, scratch, |i, scratch| {
+                    ControlFlow::Continue(ask(part * PART + i, scratch))
+                })
             })
         })?;
     }

@@ -20,8 +20,7 @@ pub(crate) enum Poses<'py> {
 }
 
 /// What errors say was expected.
-const EXPECTED: &str =
-    "a pose of shape (4, 4), poses of shape (N, 4, 4), a rotation with as_matrix(), or a pair (rotation, translation)";
+const EXPECTED: &str = "a pose of shape (4, 4), poses of shape (N, 4, 4), a rotation with as_matrix(), or a pair (rotation, translation)";
 
 const IDENTITY: Matrix = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
@@ -56,9 +55,9 @@ impl<'py> Poses<'py> {
     pub(crate) fn one(&self, scan: &Scan) -> PyResult<Pose> {
         match self {
             Self::One(matrix) => pose_of(matrix, scan).map_err(refused),
-            Self::Many(_) => {
-                Err(refused("expected one pose of shape (4, 4) here, got an array of poses; ask once for each pose"))
-            }
+            Self::Many(_) => Err(refused(
+                "expected one pose of shape (4, 4) here, got an array of poses; ask once for each pose",
+            )),
         }
     }
 

@@ -9,16 +9,14 @@ use nearmiss::{
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
-use crate::answers::{
-    Answer, AnswerRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord,
-};
+use crate::answers::{Answer, AnswerRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord};
 use crate::arrays::{Points, vector};
 use crate::cloud::rows;
 use crate::failure::{refused, unloadable, unreadable, unwritable};
 use crate::hint::{Hint, busy};
 use crate::options::{OF_DISTANCE, OF_SCANS, OF_SHAPES, Options};
-use crate::poses::{Matrix, Poses, check_each, pose_of};
 use crate::pool::{ask, ask_each};
+use crate::poses::{Matrix, Poses, check_each, pose_of};
 use crate::prepare::watched;
 use crate::record::array;
 use crate::target::Target;
@@ -41,9 +39,16 @@ impl Recipe {
     fn new(given: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut recipe = Self { build: BuildOptions::default(), graph: None };
         let Some(given) = given else { return Ok(recipe) };
-        if let Some(unknown) = given.keys().iter().map(|name| name.to_string()).find(|name| !Self::NAMES.contains(&name.as_str())) {
+        if let Some(unknown) = given
+            .keys()
+            .iter()
+            .map(|name| name.to_string())
+            .find(|name| !Self::NAMES.contains(&name.as_str()))
+        {
             let known = Self::NAMES.join(", ");
-            return Err(pyo3::exceptions::PyTypeError::new_err(format!("expected options among {known}, got `{unknown}`")));
+            return Err(pyo3::exceptions::PyTypeError::new_err(format!(
+                "expected options among {known}, got `{unknown}`"
+            )));
         }
         let of = |name: &str| given.get_item(name).map(|value| value.filter(|value| !value.is_none()));
         if let Some(neighbours) = of("radius_neighbours")? {
@@ -63,11 +68,17 @@ impl Recipe {
     }
 
     /// Prepares a cloud, watched.
-    fn prepare(self, py: Python<'_>, cloud: PointCloud, told: Option<&Bound<'_, PyAny>>) -> PyResult<Prepared> {
+    fn prepare(
+        self,
+        py: Python<'_>,
+        cloud: PointCloud,
+        told: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Prepared> {
         let work = Workspace::in_memory();
         let progress = work.progress().clone();
         let whole = watched(py, told, &progress, move || {
-            let scan = Prepared::build_in(&(&cloud).into(), &self.build, &work).map_err(|cause| cause.to_string())?;
+            let scan = Prepared::build_in(&(&cloud).into(), &self.build, &work)
+                .map_err(|cause| cause.to_string())?;
             match &self.graph {
                 None => Ok(scan),
                 Some((options, scanner)) => {
@@ -149,7 +160,12 @@ impl Scan {
     }
 
     /// Returns the one pose of each of both scans.
-    fn both(&self, other: &Self, pose: Option<&Bound<'_, PyAny>>, own: Option<&Bound<'_, PyAny>>) -> PyResult<[Pose; 2]> {
+    fn both(
+        &self,
+        other: &Self,
+        pose: Option<&Bound<'_, PyAny>>,
+        own: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<[Pose; 2]> {
         Ok([Poses::new(own)?.one(&self.0)?, Poses::new(pose)?.one(&other.0)?])
     }
 }
@@ -473,7 +489,11 @@ impl Scan {
     ///
     /// Options: `margin`, `thickened`, `surface_only`, `evidence` and `detail`, as for `collide`.
     #[pyo3(signature = (pose = None, **options))]
-    fn target(&self, pose: Option<&Bound<'_, PyAny>>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Target> {
+    fn target(
+        &self,
+        pose: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Target> {
         let options = Options::new(options, OF_SHAPES, &self.0)?;
         Target::new(&self.0, Poses::new(pose)?.one(&self.0)?, &options)
     }

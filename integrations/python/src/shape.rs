@@ -105,7 +105,12 @@ impl Shape {
     /// A cylinder about the axis y of `pose`, of shape (4, 4). `rounding` grows it by a length.
     #[staticmethod]
     #[pyo3(signature = (half_height, radius, pose = None, rounding = 0.0))]
-    fn cylinder(half_height: f64, radius: f64, pose: Option<&Bound<'_, PyAny>>, rounding: f64) -> PyResult<Self> {
+    fn cylinder(
+        half_height: f64,
+        radius: f64,
+        pose: Option<&Bound<'_, PyAny>>,
+        rounding: f64,
+    ) -> PyResult<Self> {
         Self::checked(Kind::Cylinder(self::pose(pose)?, half_height, radius), rounding)
     }
 
@@ -123,7 +128,8 @@ impl Shape {
     fn triangle(points: &Bound<'_, PyAny>, rounding: f64) -> PyResult<Self> {
         let corners = Points::new(points)?.to_doubles()?;
         let corners = <[[f64; 3]; 3]>::try_from(corners);
-        let corners = corners.map_err(|_| wrong_shape("the corners of a triangle, of shape (3, 3)", points))?;
+        let corners =
+            corners.map_err(|_| wrong_shape("the corners of a triangle, of shape (3, 3)", points))?;
         Self::checked(Kind::Triangle(corners), rounding)
     }
 
@@ -139,12 +145,20 @@ impl Shape {
         match &self.kind {
             Kind::Sphere(centre) => format!("Shape.sphere({centre:?}, {rounding})"),
             Kind::Capsule([start, end]) => format!("Shape.capsule({start:?}, {end:?}, {rounding})"),
-            Kind::Box(pose, half) => format!("<Shape: box, half sides {half:?}, at {:?}>", pose.translation()),
+            Kind::Box(pose, half) => {
+                format!("<Shape: box, half sides {half:?}, at {:?}>", pose.translation())
+            }
             Kind::Cylinder(pose, half_height, radius) => {
-                format!("<Shape: cylinder, half height {half_height}, radius {radius}, at {:?}>", pose.translation())
+                format!(
+                    "<Shape: cylinder, half height {half_height}, radius {radius}, at {:?}>",
+                    pose.translation()
+                )
             }
             Kind::Cone(pose, half_height, radius) => {
-                format!("<Shape: cone, half height {half_height}, radius {radius}, at {:?}>", pose.translation())
+                format!(
+                    "<Shape: cone, half height {half_height}, radius {radius}, at {:?}>",
+                    pose.translation()
+                )
             }
             Kind::Triangle(points) => format!("<Shape: triangle {points:?}>"),
             Kind::Hull(points) => format!("<Shape: hull of {} points>", points.len()),

@@ -3,7 +3,10 @@
 use nearmiss::ShapeVerdict;
 use pyo3::prelude::*;
 
-use crate::codes::{NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, verdict_name, number, plain, reason_code, reason_name, shown, undecided, vector};
+use crate::codes::{
+    NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, number, plain,
+    reason_code, reason_name, shown, undecided, vector, verdict_name,
+};
 use crate::record::record;
 
 record! {
@@ -183,4 +186,3 @@ fn ray_in_words(record: &RayRecord) -> String {
     let evidence = shown(record.evidence);
     if record.hit == 1 { format!("hit at t = {}{evidence}", record.t) } else { format!("no hit{evidence}") }
 }
-

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::codes::{
-    NONE, NOWHERE, answer, evidence_code, evidence_name, is_touching, verdict_name, number, plain, reason_name, shown,
-    sweep_reason_code, undecided, vector,
+    NONE, NOWHERE, answer, evidence_code, evidence_name, is_touching, number, plain, reason_name, shown,
+    sweep_reason_code, undecided, vector, verdict_name,
 };
 use crate::failure::refused;
 use crate::options::Options;
@@ -116,7 +116,9 @@ answer! {
 
 fn sweep_in_words(record: &SweepRecord) -> String {
     match record.verdict {
-        1 => format!("impact at t = {}, free up to {}{}", record.t_hit, record.t_free, shown(record.evidence)),
+        1 => {
+            format!("impact at t = {}, free up to {}{}", record.t_hit, record.t_free, shown(record.evidence))
+        }
         0 => format!("free, at least {} apart", record.clearance),
         _ => format!("free up to {}, then {}", record.t_free, undecided(record.reason)),
     }

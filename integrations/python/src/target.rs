@@ -122,8 +122,9 @@ impl Target {
     fn distance(&self, shape: &Bound<'_, Shape>, within: f64) -> PyResult<ShapeDistance> {
         check_reach(within)?;
         let convex = shape.get().convex();
-        let record =
-            |scratch: &mut Scratch| ShapeDistanceRecord::new(self.at().distance(&convex, within, scratch).as_ref());
+        let record = |scratch: &mut Scratch| {
+            ShapeDistanceRecord::new(self.at().distance(&convex, within, scratch).as_ref())
+        };
         Ok(ShapeDistance(ask(shape.py(), record)))
     }
 

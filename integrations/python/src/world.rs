@@ -89,7 +89,12 @@ impl World {
     /// Return the pairs of ids, of shape (N, 2), whose bounding boxes come within the length `reach`; of
     /// all bodies, or those with a body in the list `of`. All other pairs are further apart.
     #[pyo3(signature = (reach = 0.0, of = None))]
-    fn near_pairs<'py>(&self, py: Python<'py>, reach: f64, of: Option<Vec<u64>>) -> PyResult<Bound<'py, PyAny>> {
+    fn near_pairs<'py>(
+        &self,
+        py: Python<'py>,
+        reach: f64,
+        of: Option<Vec<u64>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         if !(reach >= 0.0) {
             return Err(refused(format!("expected a reach of at least 0, got {reach}")));
         }
@@ -117,12 +122,19 @@ impl World {
         };
         let options = Options::of_metric(options, OF_SCANS, first.scan().metric())?;
         let plan = CollidePlan::new(&options.collide, first.scan(), first.scan()).map_err(refused)?;
-        if let Some(id) = world.ids().find(|&id| world.placed(id).is_some_and(|other| other.scan().metric() != first.scan().metric())) {
-            return Err(refused(format!("expected scans prepared for one kernel, got another one of body {}", id.0)));
+        if let Some(id) = world
+            .ids()
+            .find(|&id| world.placed(id).is_some_and(|other| other.scan().metric() != first.scan().metric()))
+        {
+            return Err(refused(format!(
+                "expected scans prepared for one kernel, got another one of body {}",
+                id.0
+            )));
         }
         let pairs = near(py, &world, plan.reach(), of.as_deref());
         let answers = ask_each(py, pairs.len(), |i, scratch| {
-            let answer = world.pair(pairs[i]).map(|pair| pair.within(&options.budget()).collide(&plan, scratch));
+            let answer =
+                world.pair(pairs[i]).map(|pair| pair.within(&options.budget()).collide(&plan, scratch));
             AnswerRecord::new(&answer.unwrap_or(nearmiss::Answer::UNASKED))
         })?;
         let flat: Vec<u64> = pairs.iter().flatten().map(|id| id.0).collect();

@@ -45,8 +45,7 @@ fn every_layout_and_byte_order_gives_the_same_points() {
                 let data = laid_out(&points, width, padding, is_bigendian);
                 let sizes = [width, 20 / width].map(|size| u32::try_from(size).unwrap());
                 let padded = padding.map(|bytes| u32::try_from(bytes).unwrap());
-                let message =
-                    PointCloud2 { is_bigendian, ..message(&data, sizes[0], sizes[1], padded) };
+                let message = PointCloud2 { is_bigendian, ..message(&data, sizes[0], sizes[1], padded) };
                 let view = PointCloud2View::new(message).unwrap();
                 let case = format!("big endian {is_bigendian}, padding {padding:?}, width {width}");
                 assert_eq!((view.len(), view.is_organised()), (20, width < 20), "{case}");
