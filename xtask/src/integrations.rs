@@ -127,7 +127,7 @@ fn output(command: &mut Command, name: &str, input: &[u8]) -> Outcome<String> {
     let input = input.to_vec();
     let writer = std::thread::spawn(move || stdin.write_all(&input));
     let output = child.wait_with_output()?;
-    let written = writer.join().map_err(|_| "expected a writer, got a panic")?;
+    let written = writer.join().map_err(|_panic| "expected a writer, got a panic")?;
     if !output.status.success() {
         return Err(format!("`{name}` failed: {}", output.status).into());
     }
@@ -217,7 +217,7 @@ fn matrix(value: &serde_json::Value) -> Outcome<[f64; 16]> {
         .as_array()
         .map(|row| row.iter().filter_map(serde_json::Value::as_f64).collect())
         .unwrap_or_default();
-    <[f64; 16]>::try_from(numbers).map_err(|_| "expected 16 numbers of a pose".into())
+    <[f64; 16]>::try_from(numbers).map_err(|_count| "expected 16 numbers of a pose".into())
 }
 
 /// Makes the environment `target/integrations/python` with these packages; `None` if that fails.
@@ -284,7 +284,8 @@ pub(crate) fn wheel(words: &[&str]) -> Outcome {
     Ok(())
 }
 
-/// Builds the C library and lays it out in a folder: header, libraries, pkg-config, CMake.
+/// Builds the C library and lays it out in a folder: header, libraries, files of
+/// pkg-config and `CMake`.
 pub(crate) fn c_library(words: &[&str]) -> Outcome {
     let [prefix] = words else { return Err("expected `c-library FOLDER`, got other words".into()) };
     run_cargo(&["build", "--release", "--quiet", "-p", "nearmiss-c"])?;

@@ -414,19 +414,19 @@ typedef struct NearmissScanAbout {
  */
 typedef struct NearmissOptions {
     /*
-     A NearmissSemantics.
+     A `NearmissSemantics`.
      */
     int32_t semantics;
     /*
-     The wanted NearmissEvidence of separations.
+     The wanted `NearmissEvidence` of separations.
      */
     int32_t evidence;
     /*
-     A NearmissDetail.
+     A `NearmissDetail`.
      */
     int32_t detail;
     /*
-     The radius of balls with NEARMISS_SEMANTICS_THICKENED.
+     The radius of balls with `NEARMISS_SEMANTICS_THICKENED`.
      */
     double thickness;
     /*
@@ -676,7 +676,7 @@ typedef struct NearmissDistance {
  */
 typedef struct NearmissShape {
     /*
-     A NearmissShapeKind.
+     A `NearmissShapeKind`.
      */
     int32_t kind;
     /*
@@ -848,7 +848,7 @@ typedef struct NearmissRayHit {
 } NearmissRayHit;
 
 /*
- A field of a ROS PointField.
+ A field of a ROS `PointField`.
  */
 typedef struct NearmissMessageField {
     /*
@@ -870,7 +870,7 @@ typedef struct NearmissMessageField {
 } NearmissMessageField;
 
 /*
- The contents of a ROS PointCloud2. Nothing is copied.
+ The contents of a ROS `PointCloud2`. Nothing is copied.
  */
 typedef struct NearmissMessage {
     /*
@@ -1126,16 +1126,18 @@ NearmissStatus nearmiss_scan_read(const char *file,
                                   struct NearmissScan **out);
 
 /*
- Opens a prepared file by mapping it; `checks` is a NearmissChecks. The file must not be changed in
+ Opens a prepared file by mapping it; `checks` is a `NearmissChecks`. The file must not be changed in
  place while it is open; saving over it is fine. Thread safety: any thread.
 
  # Safety
  `file` is null or text that ends with a zero byte; `out` is null or valid.
  */
-NearmissStatus nearmiss_scan_open(const char *file, int32_t checks, struct NearmissScan **out);
+NearmissStatus nearmiss_scan_open(const char *file,
+                                  int32_t checks,
+                                  struct NearmissScan **out);
 
 /*
- Loads a scan from the bytes of a prepared file, which are copied; `checks` is a NearmissChecks.
+ Loads a scan from the bytes of a prepared file, which are copied; `checks` is a `NearmissChecks`.
  Thread safety: any thread.
 
  # Safety
@@ -1429,7 +1431,7 @@ NearmissStatus nearmiss_cast_all(const struct NearmissPlan *plan,
                                  size_t *count);
 
 /*
- Prepares the points of a ROS PointCloud2, with its normals if it has any. Points that are not finite
+ Prepares the points of a ROS `PointCloud2`, with its normals if it has any. Points that are not finite
  are dropped. `options` may be null. Thread safety: any thread.
 
  # Safety

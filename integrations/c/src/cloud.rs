@@ -10,7 +10,7 @@ use crate::pointer::{required, slice, text};
 use crate::scan::{PrepareOptions, Scan, nearmiss_prepare_options, prepare};
 use crate::status::{Failure, Status, guard};
 
-/// A field of a ROS PointField.
+/// A field of a ROS `PointField`.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct MessageField {
@@ -24,7 +24,7 @@ pub struct MessageField {
     pub count: u32,
 }
 
-/// The contents of a ROS PointCloud2. Nothing is copied.
+/// The contents of a ROS `PointCloud2`. Nothing is copied.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct Message {
@@ -48,7 +48,7 @@ pub struct Message {
     pub data_length: usize,
 }
 
-/// Prepares the points of a ROS PointCloud2, with its normals if it has any. Points that are not finite
+/// Prepares the points of a ROS `PointCloud2`, with its normals if it has any. Points that are not finite
 /// are dropped. `options` may be null. Thread safety: any thread.
 ///
 /// # Safety

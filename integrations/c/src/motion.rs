@@ -116,7 +116,6 @@ pub unsafe extern "C" fn nearmiss_motion_free(motion: *mut Motion) -> Status {
 /// Proves that two scans stay apart, by more than the margin of the plan, along their motions, or
 /// finds the first impact. `limits` may be null. Thread safety: one call at a time for each scratch.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "two scans and two motions")]
 pub extern "C" fn nearmiss_sweep(
     plan: Option<&Plan>,
     a: Option<&Scan>,

@@ -181,7 +181,7 @@ fn check(checks: i32) -> Result<Check, Failure> {
     }
 }
 
-/// Opens a prepared file by mapping it; `checks` is a NearmissChecks. The file must not be changed in
+/// Opens a prepared file by mapping it; `checks` is a `NearmissChecks`. The file must not be changed in
 /// place while it is open; saving over it is fine. Thread safety: any thread.
 ///
 /// # Safety
@@ -200,7 +200,7 @@ pub unsafe extern "C" fn nearmiss_scan_open(
     })
 }
 
-/// Loads a scan from the bytes of a prepared file, which are copied; `checks` is a NearmissChecks.
+/// Loads a scan from the bytes of a prepared file, which are copied; `checks` is a `NearmissChecks`.
 /// Thread safety: any thread.
 ///
 /// # Safety

@@ -109,7 +109,6 @@ pub extern "C" fn nearmiss_walker_step(
 /// # Safety
 /// `out` are `2 · capacity` places; other pointers are null or valid.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "a question and a list")]
 pub unsafe extern "C" fn nearmiss_route(
     map: Option<&SliceMap>,
     size: Option<&Avatar>,

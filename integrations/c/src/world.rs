@@ -90,7 +90,6 @@ pub extern "C" fn nearmiss_world_move(world: Option<&mut World>, id: u64, pose: 
 /// # Safety
 /// `ids` are `id_count` numbers, `out` are `capacity` places; other pointers are null or valid.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "a question, its memory and two lists")]
 pub unsafe extern "C" fn nearmiss_world_near_pairs(
     world: Option<&World>,
     plan: Option<&Plan>,

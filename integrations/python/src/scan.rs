@@ -175,7 +175,7 @@ impl Scan {
     /// Prepare points of shape (N, 3), float32 or float64; those that are contiguous are not copied.
     ///
     /// `normals` has shape (N, 3). `drop_invalid` drops points that are not finite, which raise
-    /// ValueError otherwise. `progress` is called with the share that is done, from 0 to 1. Options:
+    /// `ValueError` otherwise. `progress` is called with the share that is done, from 0 to 1. Options:
     /// `radius_neighbours` (3 to 32, default 6), `reach` (the widest gap that is bridged, a length),
     /// `graph` (orient the normals), `scanner` (a position of shape (3,) that normals face; implies
     /// `graph`), `close_pairs` (distances along the surface; implies `graph`). Takes about 1.5 s for a
@@ -343,7 +343,7 @@ impl Scan {
         let (py, other) = (other.py(), other.get());
         let (plan, options) = self.plan(other, options)?;
         let [a, b] = self.both(other, pose, own_pose)?;
-        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_busy| busy())).transpose()?;
         let hint = hint.as_deref_mut();
         let answer = ask(py, |scratch| {
             let pair = Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget());
@@ -471,7 +471,7 @@ impl Scan {
         let (py, other) = (other.py(), other.get());
         let (plan, options) = self.plan(other, options)?;
         let [a, b] = self.both(other, pose, own_pose)?;
-        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_busy| busy())).transpose()?;
         let hint = hint.as_deref_mut();
         let mut found = Vec::new();
         ask(py, |scratch| {
