@@ -13,7 +13,7 @@ const FREED: u64 = u64::from_le_bytes(*b"nm-freed");
 /// The number of freed handles whose memory is kept, so that their use is noticed.
 const KEPT: usize = 256;
 
-/// What a handle points to. The mark comes first in handles of all kinds, so that one of another kind
+/// The target of a handle. The mark comes first in handles of all kinds, so that one of another kind
 /// is recognised.
 #[derive(Debug)]
 #[repr(C)]

@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 use crate::handle::{Handle, free, get_mut, make, opaque};
 use crate::status::{Status, guard};
 
-/// What the last question about a pair of scans found out. Keep one for each pair whose poses
+/// The findings of the last question about a pair of scans. Keep one for each pair whose poses
 /// change little between questions. It never changes a verdict, except one that a budget ends.
 #[derive(Debug)]
 pub struct Hint(Handle<PairHint>);

@@ -54,7 +54,7 @@ pub struct Options {
     pub thickness: f64,
     /// Nearer than this counts as touching; of a sweep, the distance to keep.
     pub margin: f64,
-    /// How far a lower bound of a distance may stay below the upper one, as a share of it.
+    /// The share of the upper bound of a distance by which the lower one may stay below it.
     pub relative: f64,
 }
 
