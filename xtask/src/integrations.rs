@@ -18,7 +18,7 @@ const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-g"];
 pub(crate) fn run() -> Outcome {
     // The features, and so the artefacts, are those of the check `tests`.
     run_cargo(&["build", "--workspace", "--lib", "--tests", "--quiet"])?;
-    let built = built()?;
+    let built = built("debug")?;
     let work = root().join("target").join("integrations");
     fs::create_dir_all(&work)?;
     match compilers() {
@@ -34,11 +34,11 @@ fn skip(what: &str) -> Outcome {
     Ok(())
 }
 
-/// Returns the folder with the libraries and the command line of the dev profile.
-fn built() -> Outcome<PathBuf> {
+/// Returns the folder with the libraries and programs of a profile.
+fn built(profile: &str) -> Outcome<PathBuf> {
     let program = std::env::current_exe()?;
     let target = program.ancestors().nth(2).ok_or("expected this program in a target folder")?;
-    Ok(target.join("debug"))
+    Ok(target.join(profile))
 }
 
 /// Returns the name of a shared library.
@@ -289,8 +289,7 @@ pub(crate) fn wheel(words: &[&str]) -> Outcome {
 pub(crate) fn c_library(words: &[&str]) -> Outcome {
     let [prefix] = words else { return Err("expected `c-library FOLDER`, got other words".into()) };
     run_cargo(&["build", "--release", "--quiet", "-p", "nearmiss-c"])?;
-    let program = std::env::current_exe()?;
-    let release = program.parent().ok_or("expected this program in a target folder")?;
+    let release = built("release")?;
     let (source, prefix) = (root().join("integrations/c"), Path::new(prefix));
     let [include, lib] = ["include", "lib"].map(|name| prefix.join(name));
     let [pkgconfig, cmake] = ["pkgconfig", "cmake/nearmiss"].map(|name| lib.join(name));
