@@ -4,15 +4,16 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::repository::{Outcome, cargo, members, root, run_cargo};
-use crate::tidy;
+use crate::{integrations, tidy};
 
 type Check = fn() -> Outcome;
 
 /// The checks, the quickest first.
-const CHECKS: [(&str, Check); 9] = [
+const CHECKS: [(&str, Check); 10] = [
     ("tidy", tidy::run),
     ("format", || run_cargo(&["fmt", "--all", "--check"])),
     ("tests", || run_cargo(&["test", "--workspace", "--quiet"])),
+    ("integrations", integrations::run),
     ("verify", verify),
     ("lints", || run_cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])),
     ("docs", docs),

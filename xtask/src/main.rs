@@ -4,8 +4,9 @@
 //! * `tidy` — checks that compilers do not make; `ci` — every check, as `test` without names.
 //! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, those of Klein & Zachmann 2005, and
 //!   tables and plots of dos Anjos et al. 2012, measured.
-//! * `test [tidy|format|lints|docs|features|packages|tests|verify|determinism …]` — every check, or
-//!   the named ones.
+//! * `test [tidy|format|tests|integrations|verify|lints|docs|features|packages|determinism …]` — every
+//!   check, or the named ones.
+//! * `wheel` — the wheel of the Python package; `c-library FOLDER` — the C library, ready to link with.
 //! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
 //! * `inventory [COMMIT]` — the size of the libraries, compared with an earlier commit.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
@@ -22,6 +23,7 @@ mod demo;
 mod field;
 mod fuzz;
 mod geodesic;
+mod integrations;
 mod inventory;
 mod level;
 mod readers;
@@ -35,7 +37,7 @@ use std::process::ExitCode;
 /// A chore of the repository: name, arguments, description.
 type Chore = (&'static str, &'static str, &'static str);
 
-const CHORES: [Chore; 12] = [
+const CHORES: [Chore; 14] = [
     (
         "demo",
         "",
@@ -44,7 +46,8 @@ const CHORES: [Chore; 12] = [
     (
         "test",
         "[CHECK…]",
-        "Run all checks, or these: tidy, format, tests, verify, lints, docs, features, packages, determinism",
+        "Run all checks, or these: tidy, format, tests, integrations, verify, lints, docs, features, packages, \
+         determinism",
     ),
     ("tidy", "", "Run the check `tidy`"),
     ("ci", "", "Run all checks"),
@@ -73,6 +76,12 @@ const CHORES: [Chore; 12] = [
         "tables",
         "-o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--poses N] [--quick]",
         "Measure the tables and figures of Klein & Zachmann 2004 and 2005 and of Anjos et al. 2012",
+    ),
+    ("wheel", "[-o FOLDER]", "Build the wheel of the Python package, into target/wheels by default"),
+    (
+        "c-library",
+        "FOLDER",
+        "Build the C library: its header, shared and static library, pkg-config and CMake files, in a folder",
     ),
     ("readers", "", "Install independent readers, whose points a test compares with ours"),
     (
@@ -130,6 +139,8 @@ fn main() -> ExitCode {
         ["inventory", words @ ..] => inventory::run_with(words),
         ["level", words @ ..] => level::run(words),
         ["readers"] => readers::run(),
+        ["wheel", words @ ..] => integrations::wheel(words),
+        ["c-library", words @ ..] => integrations::c_library(words),
         ["fuzz", words @ ..] => fuzz::run(words),
         ["tables", words @ ..] => tables::run(words),
         ["test", names @ ..] => checks::run(names),

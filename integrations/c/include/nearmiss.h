@@ -5,11 +5,9 @@
 
 /* Made from the sources by cbindgen: NEARMISS_WRITE_HEADER=1 cargo test -p nearmiss-c */
 
-#include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <stdlib.h>
 
 /*
  The outcome of a function. `nearmiss_last_error` tells more about all but OK.
@@ -160,6 +158,180 @@ typedef int32_t NearmissReason;
 #endif // __cplusplus
 
 /*
+ How the bytes of a prepared scan are checked.
+ */
+enum NearmissChecks
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /*
+     Checksums and every number.
+     */
+    NEARMISS_CHECKS_FULL = 0,
+    /*
+     The layout, for files from a trusted source; takes the same time for any scan.
+     */
+    NEARMISS_CHECKS_STRUCTURE = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum NearmissChecks NearmissChecks;
+#else
+typedef int32_t NearmissChecks;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
+ The amount of detail about contacts and hits.
+ */
+enum NearmissDetail
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /*
+     Accurate to first order. Fastest.
+     */
+    NEARMISS_DETAIL_VERDICT = 0,
+    /*
+     Points on the surfaces, verified if possible.
+     */
+    NEARMISS_DETAIL_WITNESS = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum NearmissDetail NearmissDetail;
+#else
+typedef int32_t NearmissDetail;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
+ The meaning of "meet".
+ */
+enum NearmissSemantics
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /*
+     Surfaces where points sample a sheet, balls elsewhere, and every measured point.
+     */
+    NEARMISS_SEMANTICS_OBSTACLE = 0,
+    /*
+     Surfaces alone.
+     */
+    NEARMISS_SEMANTICS_SURFACE = 1,
+    /*
+     Balls of radius `thickness` about the points.
+     */
+    NEARMISS_SEMANTICS_THICKENED = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum NearmissSemantics NearmissSemantics;
+#else
+typedef int32_t NearmissSemantics;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
+ The kind of a shape.
+ */
+enum NearmissShapeKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /*
+     A ball about `corners[0]`.
+     */
+    NEARMISS_SHAPE_KIND_SPHERE = 0,
+    /*
+     All points within `radius` of the segment from `corners[0]` to `corners[1]`.
+     */
+    NEARMISS_SHAPE_KIND_CAPSULE = 1,
+    /*
+     A box about the origin of `pose` with half sides `half`.
+     */
+    NEARMISS_SHAPE_KIND_BOX = 2,
+    /*
+     A cylinder about the axis y of `pose`, of half height `half[1]`.
+     */
+    NEARMISS_SHAPE_KIND_CYLINDER = 3,
+    /*
+     A cone about the axis y of `pose`, of half height `half[1]`, with its tip upwards.
+     */
+    NEARMISS_SHAPE_KIND_CONE = 4,
+    /*
+     The triangle `corners`.
+     */
+    NEARMISS_SHAPE_KIND_TRIANGLE = 5,
+    /*
+     The convex hull of `points`.
+     */
+    NEARMISS_SHAPE_KIND_HULL = 6,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum NearmissShapeKind NearmissShapeKind;
+#else
+typedef int32_t NearmissShapeKind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
+ What the last question about a pair of scans found out. Keep one for each pair whose poses
+ change little between questions. It never changes a verdict, except one that a budget ends.
+ */
+typedef struct NearmissHint NearmissHint;
+
+/*
+ A motion through poses. Any number of threads may use one at the same time.
+ */
+typedef struct NearmissMotion NearmissMotion;
+
+/*
+ Validated options. A plan serves every question, about any scans prepared in the same way as
+ those that it was made for, in any poses. Any number of threads may use one at the same time.
+ */
+typedef struct NearmissPlan NearmissPlan;
+
+/*
+ A prepared scan. Any number of threads may use one at the same time.
+ */
+typedef struct NearmissScan NearmissScan;
+
+/*
+ Working memory of questions. Make one for each thread, and reuse it: a question does not
+ allocate once its scratch is warm. It serves every question and never changes an answer.
+ */
+typedef struct NearmissScratch NearmissScratch;
+
+/*
+ The contacts of a shape and a scan in the last frame. Keep one for each pair: contacts keep
+ their ids, and the shape its side of a surface.
+ */
+typedef struct NearmissShapeHint NearmissShapeHint;
+
+/*
+ A building as a stack of images. Any number of threads may use one at the same time.
+ */
+typedef struct NearmissSliceMap NearmissSliceMap;
+
+/*
+ An avatar somewhere in a map.
+ */
+typedef struct NearmissWalker NearmissWalker;
+
+/*
+ Placed scans, each a body with an id. Any number of threads may ask at the same time, while none
+ changes it.
+ */
+typedef struct NearmissWorld NearmissWorld;
+
+/*
  A pose: world = scale · rotation · object + translation.
  */
 typedef struct NearmissPose {
@@ -200,11 +372,6 @@ typedef struct NearmissPrepareOptions {
 } NearmissPrepareOptions;
 
 /*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissScan **NearmissOut_Scan;
-
-/*
  Facts about a scan. Lengths are in the units of its input.
  */
 typedef struct NearmissScanAbout {
@@ -243,33 +410,23 @@ typedef struct NearmissScanAbout {
 } NearmissScanAbout;
 
 /*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissHint **NearmissOut_Hint;
-
-/*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissShapeHint **NearmissOut_ShapeHint;
-
-/*
  Options of a plan. Start from `nearmiss_options`. Lengths are in world units.
  */
 typedef struct NearmissOptions {
     /*
-     A NearmissSemantics.
+     A `NearmissSemantics`.
      */
     int32_t semantics;
     /*
-     The wanted NearmissEvidence of separations.
+     The wanted `NearmissEvidence` of separations.
      */
     int32_t evidence;
     /*
-     A NearmissDetail.
+     A `NearmissDetail`.
      */
     int32_t detail;
     /*
-     The radius of balls with NEARMISS_SEMANTICS_THICKENED.
+     The radius of balls with `NEARMISS_SEMANTICS_THICKENED`.
      */
     double thickness;
     /*
@@ -297,23 +454,13 @@ typedef struct NearmissBudget {
 } NearmissBudget;
 
 /*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissPlan **NearmissOut_Plan;
-
-/*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissScratch **NearmissOut_Scratch;
-
-/*
  A scan at a pose in the world.
  */
 typedef struct NearmissPlaced {
     /*
      The scan.
      */
-    const NearmissScan *scan;
+    const struct NearmissScan *scan;
     /*
      Maps the frame of the scan's input to the world.
      */
@@ -529,7 +676,7 @@ typedef struct NearmissDistance {
  */
 typedef struct NearmissShape {
     /*
-     A NearmissShapeKind.
+     A `NearmissShapeKind`.
      */
     int32_t kind;
     /*
@@ -701,7 +848,7 @@ typedef struct NearmissRayHit {
 } NearmissRayHit;
 
 /*
- A field of a ROS PointField.
+ A field of a ROS `PointField`.
  */
 typedef struct NearmissMessageField {
     /*
@@ -723,7 +870,7 @@ typedef struct NearmissMessageField {
 } NearmissMessageField;
 
 /*
- The contents of a ROS PointCloud2. Nothing is copied.
+ The contents of a ROS `PointCloud2`. Nothing is copied.
  */
 typedef struct NearmissMessage {
     /*
@@ -763,11 +910,6 @@ typedef struct NearmissMessage {
      */
     size_t data_length;
 } NearmissMessage;
-
-/*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissMotion **NearmissOut_Motion;
 
 /*
  The answer about a motion. Missing numbers are NaN. Times count poses, with fractions.
@@ -842,11 +984,6 @@ typedef struct NearmissMapOptions {
 } NearmissMapOptions;
 
 /*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissSliceMap **NearmissOut_SliceMap;
-
-/*
  The content of a box.
  */
 typedef struct NearmissOccupancy {
@@ -891,11 +1028,6 @@ typedef struct NearmissAvatar {
 } NearmissAvatar;
 
 /*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissWalker **NearmissOut_Walker;
-
-/*
  The result of a step.
  */
 typedef struct NearmissStep {
@@ -912,11 +1044,6 @@ typedef struct NearmissStep {
      */
     bool falling;
 } NearmissStep;
-
-/*
- The place of a new handle, which is null if there is none.
- */
-typedef NearmissWorld **NearmissOut_World;
 
 /*
  The ids of two bodies, the smaller one first.
@@ -974,7 +1101,7 @@ struct NearmissPrepareOptions nearmiss_prepare_options(void);
 NearmissStatus nearmiss_scan_from_points(const double *points,
                                          size_t count,
                                          const struct NearmissPrepareOptions *options,
-                                         NearmissOut_Scan out);
+                                         struct NearmissScan **out);
 
 /*
  Like `nearmiss_scan_from_points`, with numbers in single precision. Thread safety: any thread.
@@ -985,7 +1112,7 @@ NearmissStatus nearmiss_scan_from_points(const double *points,
 NearmissStatus nearmiss_scan_from_floats(const float *points,
                                          size_t count,
                                          const struct NearmissPrepareOptions *options,
-                                         NearmissOut_Scan out);
+                                         struct NearmissScan **out);
 
 /*
  Reads and prepares a file of points: PLY, PCD, LAS, LAZ, E57, NPY, OBJ, STL, OFF, glTF or text.
@@ -996,19 +1123,21 @@ NearmissStatus nearmiss_scan_from_floats(const float *points,
  */
 NearmissStatus nearmiss_scan_read(const char *file,
                                   const struct NearmissPrepareOptions *options,
-                                  NearmissOut_Scan out);
+                                  struct NearmissScan **out);
 
 /*
- Opens a prepared file by mapping it; `checks` is a NearmissChecks. The file must not be changed in
+ Opens a prepared file by mapping it; `checks` is a `NearmissChecks`. The file must not be changed in
  place while it is open; saving over it is fine. Thread safety: any thread.
 
  # Safety
  `file` is null or text that ends with a zero byte; `out` is null or valid.
  */
-NearmissStatus nearmiss_scan_open(const char *file, int32_t checks, NearmissOut_Scan out);
+NearmissStatus nearmiss_scan_open(const char *file,
+                                  int32_t checks,
+                                  struct NearmissScan **out);
 
 /*
- Loads a scan from the bytes of a prepared file, which are copied; `checks` is a NearmissChecks.
+ Loads a scan from the bytes of a prepared file, which are copied; `checks` is a `NearmissChecks`.
  Thread safety: any thread.
 
  # Safety
@@ -1017,7 +1146,7 @@ NearmissStatus nearmiss_scan_open(const char *file, int32_t checks, NearmissOut_
 NearmissStatus nearmiss_scan_from_bytes(const uint8_t *bytes,
                                         size_t length,
                                         int32_t checks,
-                                        NearmissOut_Scan out);
+                                        struct NearmissScan **out);
 
 /*
  Saves a scan to a prepared file, atomically. Thread safety: any thread.
@@ -1025,7 +1154,7 @@ NearmissStatus nearmiss_scan_from_bytes(const uint8_t *bytes,
  # Safety
  `file` is null or text that ends with a zero byte; `scan` is null or a handle.
  */
-NearmissStatus nearmiss_scan_save(const NearmissScan *scan, const char *file);
+NearmissStatus nearmiss_scan_save(const struct NearmissScan *scan, const char *file);
 
 /*
  Writes the bytes of a prepared file to `buffer`, as many as its capacity holds, and their whole
@@ -1034,7 +1163,7 @@ NearmissStatus nearmiss_scan_save(const NearmissScan *scan, const char *file);
  # Safety
  `buffer` are `capacity` bytes that nothing else uses; other pointers are null or valid.
  */
-NearmissStatus nearmiss_scan_to_bytes(const NearmissScan *scan,
+NearmissStatus nearmiss_scan_to_bytes(const struct NearmissScan *scan,
                                       uint8_t *buffer,
                                       size_t capacity,
                                       size_t *length);
@@ -1042,7 +1171,7 @@ NearmissStatus nearmiss_scan_to_bytes(const NearmissScan *scan,
 /*
  Writes facts about a scan to `out`. Thread safety: any thread.
  */
-NearmissStatus nearmiss_scan_about(const NearmissScan *scan, struct NearmissScanAbout *out);
+NearmissStatus nearmiss_scan_about(const struct NearmissScan *scan, struct NearmissScanAbout *out);
 
 /*
  Frees a scan; null is fine. Worlds keep the scans that were inserted. Thread safety: no other call
@@ -1051,12 +1180,12 @@ NearmissStatus nearmiss_scan_about(const NearmissScan *scan, struct NearmissScan
  # Safety
  `scan` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_scan_free(NearmissScan *scan);
+NearmissStatus nearmiss_scan_free(struct NearmissScan *scan);
 
 /*
  Makes a hint for a pair of scans. Thread safety: any thread; later, one call at a time.
  */
-NearmissStatus nearmiss_hint_new(NearmissOut_Hint out);
+NearmissStatus nearmiss_hint_new(struct NearmissHint **out);
 
 /*
  Frees a hint; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -1065,17 +1194,17 @@ NearmissStatus nearmiss_hint_new(NearmissOut_Hint out);
  # Safety
  `hint` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_hint_free(NearmissHint *hint);
+NearmissStatus nearmiss_hint_free(struct NearmissHint *hint);
 
 /*
  Makes a hint for a shape and a scan. Thread safety: any thread; later, one call at a time.
  */
-NearmissStatus nearmiss_shape_hint_new(NearmissOut_ShapeHint out);
+NearmissStatus nearmiss_shape_hint_new(struct NearmissShapeHint **out);
 
 /*
  Forgets all contacts, as the shape was moved elsewhere. Thread safety: one call at a time.
  */
-NearmissStatus nearmiss_shape_hint_clear(NearmissShapeHint *hint);
+NearmissStatus nearmiss_shape_hint_clear(struct NearmissShapeHint *hint);
 
 /*
  Frees a hint; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -1084,7 +1213,7 @@ NearmissStatus nearmiss_shape_hint_clear(NearmissShapeHint *hint);
  # Safety
  `hint` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_shape_hint_free(NearmissShapeHint *hint);
+NearmissStatus nearmiss_shape_hint_free(struct NearmissShapeHint *hint);
 
 /*
  Returns the default options: obstacles, certified, with witnesses. Thread safety: any thread.
@@ -1101,9 +1230,9 @@ struct NearmissBudget nearmiss_unlimited(void);
  null. Thread safety: any thread.
  */
 NearmissStatus nearmiss_plan_new(const struct NearmissOptions *options,
-                                 const NearmissScan *a,
-                                 const NearmissScan *b,
-                                 NearmissOut_Plan out);
+                                 const struct NearmissScan *a,
+                                 const struct NearmissScan *b,
+                                 struct NearmissPlan **out);
 
 /*
  Frees a plan; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -1112,12 +1241,12 @@ NearmissStatus nearmiss_plan_new(const struct NearmissOptions *options,
  # Safety
  `plan` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_plan_free(NearmissPlan *plan);
+NearmissStatus nearmiss_plan_free(struct NearmissPlan *plan);
 
 /*
  Makes scratch memory. Thread safety: any thread; later, one call at a time.
  */
-NearmissStatus nearmiss_scratch_new(NearmissOut_Scratch out);
+NearmissStatus nearmiss_scratch_new(struct NearmissScratch **out);
 
 /*
  Frees scratch memory; null is fine. Thread safety: no other call may use the handle at the same time
@@ -1126,18 +1255,18 @@ NearmissStatus nearmiss_scratch_new(NearmissOut_Scratch out);
  # Safety
  `scratch` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_scratch_free(NearmissScratch *scratch);
+NearmissStatus nearmiss_scratch_free(struct NearmissScratch *scratch);
 
 /*
  Decides whether two scans touch. `limits` and `hint` may be null. Does not allocate once the scratch
  is warm. Thread safety: one call at a time for each scratch and each hint.
  */
-NearmissStatus nearmiss_collide(const NearmissPlan *plan,
+NearmissStatus nearmiss_collide(const struct NearmissPlan *plan,
                                 const struct NearmissPlaced *a,
                                 const struct NearmissPlaced *b,
                                 const struct NearmissBudget *limits,
-                                NearmissHint *hint,
-                                NearmissScratch *scratch,
+                                struct NearmissHint *hint,
+                                struct NearmissScratch *scratch,
                                 struct NearmissAnswer *out);
 
 /*
@@ -1147,12 +1276,12 @@ NearmissStatus nearmiss_collide(const NearmissPlan *plan,
  # Safety
  `list` is null or valid, and so are its places.
  */
-NearmissStatus nearmiss_manifold(const NearmissPlan *plan,
+NearmissStatus nearmiss_manifold(const struct NearmissPlan *plan,
                                  const struct NearmissPlaced *a,
                                  const struct NearmissPlaced *b,
                                  const struct NearmissBudget *limits,
-                                 NearmissHint *hint,
-                                 NearmissScratch *scratch,
+                                 struct NearmissHint *hint,
+                                 struct NearmissScratch *scratch,
                                  struct NearmissManifoldList *list,
                                  struct NearmissAnswer *out);
 
@@ -1163,11 +1292,11 @@ NearmissStatus nearmiss_manifold(const NearmissPlan *plan,
  # Safety
  `list` is null or valid, and so are its places.
  */
-NearmissStatus nearmiss_contacts(const NearmissPlan *plan,
+NearmissStatus nearmiss_contacts(const struct NearmissPlan *plan,
                                  const struct NearmissPlaced *a,
                                  const struct NearmissPlaced *b,
                                  const struct NearmissBudget *limits,
-                                 NearmissScratch *scratch,
+                                 struct NearmissScratch *scratch,
                                  struct NearmissContactList *list,
                                  struct NearmissAnswer *out);
 
@@ -1175,11 +1304,11 @@ NearmissStatus nearmiss_contacts(const NearmissPlan *plan,
  Bounds the distance of two scans. `limits` may be null. Thread safety: one call at a time for each
  scratch.
  */
-NearmissStatus nearmiss_distance(const NearmissPlan *plan,
+NearmissStatus nearmiss_distance(const struct NearmissPlan *plan,
                                  const struct NearmissPlaced *a,
                                  const struct NearmissPlaced *b,
                                  const struct NearmissBudget *limits,
-                                 NearmissScratch *scratch,
+                                 struct NearmissScratch *scratch,
                                  struct NearmissDistance *out);
 
 /*
@@ -1233,11 +1362,11 @@ struct NearmissShape nearmiss_hull(const double *points, size_t count, double ro
  # Safety
  `shapes` and `out` are `count` values; other pointers are null or valid.
  */
-NearmissStatus nearmiss_touch(const NearmissPlan *plan,
+NearmissStatus nearmiss_touch(const struct NearmissPlan *plan,
                               const struct NearmissPlaced *scan,
                               const struct NearmissShape *shapes,
                               size_t count,
-                              NearmissScratch *scratch,
+                              struct NearmissScratch *scratch,
                               struct NearmissShapeAnswer *out);
 
 /*
@@ -1247,12 +1376,12 @@ NearmissStatus nearmiss_touch(const NearmissPlan *plan,
  # Safety
  `shapes` and `out` are `count` values; other pointers are null or valid.
  */
-NearmissStatus nearmiss_shape_distance(const NearmissPlan *plan,
+NearmissStatus nearmiss_shape_distance(const struct NearmissPlan *plan,
                                        const struct NearmissPlaced *scan,
                                        const struct NearmissShape *shapes,
                                        size_t count,
                                        double within,
-                                       NearmissScratch *scratch,
+                                       struct NearmissScratch *scratch,
                                        struct NearmissShapeDistance *out);
 
 /*
@@ -1263,11 +1392,11 @@ NearmissStatus nearmiss_shape_distance(const NearmissPlan *plan,
  # Safety
  `out` are `capacity` places; other pointers are null or valid.
  */
-NearmissStatus nearmiss_shape_contacts(const NearmissPlan *plan,
+NearmissStatus nearmiss_shape_contacts(const struct NearmissPlan *plan,
                                        const struct NearmissPlaced *scan,
                                        const struct NearmissShape *shape,
-                                       NearmissShapeHint *hint,
-                                       NearmissScratch *scratch,
+                                       struct NearmissShapeHint *hint,
+                                       struct NearmissScratch *scratch,
                                        struct NearmissShapeContact *out,
                                        size_t capacity,
                                        size_t *count);
@@ -1279,11 +1408,11 @@ NearmissStatus nearmiss_shape_contacts(const NearmissPlan *plan,
  # Safety
  `rays` and `out` are `count` values; other pointers are null or valid.
  */
-NearmissStatus nearmiss_cast(const NearmissPlan *plan,
+NearmissStatus nearmiss_cast(const struct NearmissPlan *plan,
                              const struct NearmissPlaced *scan,
                              const struct NearmissRay *rays,
                              size_t count,
-                             NearmissScratch *scratch,
+                             struct NearmissScratch *scratch,
                              struct NearmissRayHit *out);
 
 /*
@@ -1293,16 +1422,16 @@ NearmissStatus nearmiss_cast(const NearmissPlan *plan,
  # Safety
  `out` are `capacity` places; other pointers are null or valid.
  */
-NearmissStatus nearmiss_cast_all(const NearmissPlan *plan,
+NearmissStatus nearmiss_cast_all(const struct NearmissPlan *plan,
                                  const struct NearmissPlaced *scan,
                                  const struct NearmissRay *ray,
-                                 NearmissScratch *scratch,
+                                 struct NearmissScratch *scratch,
                                  struct NearmissRayHit *out,
                                  size_t capacity,
                                  size_t *count);
 
 /*
- Prepares the points of a ROS PointCloud2, with its normals if it has any. Points that are not finite
+ Prepares the points of a ROS `PointCloud2`, with its normals if it has any. Points that are not finite
  are dropped. `options` may be null. Thread safety: any thread.
 
  # Safety
@@ -1310,7 +1439,7 @@ NearmissStatus nearmiss_cast_all(const NearmissPlan *plan,
  */
 NearmissStatus nearmiss_scan_from_point_cloud2(const struct NearmissMessage *message,
                                                const struct NearmissPrepareOptions *options,
-                                               NearmissOut_Scan out);
+                                               struct NearmissScan **out);
 
 /*
  Makes the motion through `count` poses by screws; pose k is reached at time k. One pose stays.
@@ -1321,7 +1450,7 @@ NearmissStatus nearmiss_scan_from_point_cloud2(const struct NearmissMessage *mes
  */
 NearmissStatus nearmiss_motion_new(const struct NearmissPose *poses,
                                    size_t count,
-                                   NearmissOut_Motion out);
+                                   struct NearmissMotion **out);
 
 /*
  Frees a motion; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -1330,19 +1459,19 @@ NearmissStatus nearmiss_motion_new(const struct NearmissPose *poses,
  # Safety
  `motion` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_motion_free(NearmissMotion *motion);
+NearmissStatus nearmiss_motion_free(struct NearmissMotion *motion);
 
 /*
  Proves that two scans stay apart, by more than the margin of the plan, along their motions, or
  finds the first impact. `limits` may be null. Thread safety: one call at a time for each scratch.
  */
-NearmissStatus nearmiss_sweep(const NearmissPlan *plan,
-                              const NearmissScan *a,
-                              const NearmissMotion *motion_a,
-                              const NearmissScan *b,
-                              const NearmissMotion *motion_b,
+NearmissStatus nearmiss_sweep(const struct NearmissPlan *plan,
+                              const struct NearmissScan *a,
+                              const struct NearmissMotion *motion_a,
+                              const struct NearmissScan *b,
+                              const struct NearmissMotion *motion_b,
                               const struct NearmissBudget *limits,
-                              NearmissScratch *scratch,
+                              struct NearmissScratch *scratch,
                               struct NearmissSweepAnswer *out);
 
 /*
@@ -1361,7 +1490,7 @@ struct NearmissMapOptions nearmiss_map_options(void);
 NearmissStatus nearmiss_map_from_points(const double *points,
                                         size_t count,
                                         const struct NearmissMapOptions *options,
-                                        NearmissOut_SliceMap out);
+                                        struct NearmissSliceMap **out);
 
 /*
  Loads all slices of a folder. Thread safety: any thread.
@@ -1369,7 +1498,7 @@ NearmissStatus nearmiss_map_from_points(const double *points,
  # Safety
  `folder` is null or text that ends with a zero byte; `out` is null or valid.
  */
-NearmissStatus nearmiss_map_open(const char *folder, NearmissOut_SliceMap out);
+NearmissStatus nearmiss_map_open(const char *folder, struct NearmissSliceMap **out);
 
 /*
  Saves a map to a folder. Thread safety: any thread.
@@ -1377,7 +1506,7 @@ NearmissStatus nearmiss_map_open(const char *folder, NearmissOut_SliceMap out);
  # Safety
  `folder` is null or text that ends with a zero byte; `map` is null or a handle.
  */
-NearmissStatus nearmiss_map_save(const NearmissSliceMap *map, const char *folder);
+NearmissStatus nearmiss_map_save(const struct NearmissSliceMap *map, const char *folder);
 
 /*
  Frees a map; null is fine. Thread safety: no other call may use the handle at the same time or later.
@@ -1385,13 +1514,13 @@ NearmissStatus nearmiss_map_save(const NearmissSliceMap *map, const char *folder
  # Safety
  `map` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_map_free(NearmissSliceMap *map);
+NearmissStatus nearmiss_map_free(struct NearmissSliceMap *map);
 
 /*
  Tells what is in the box from `min` to `max`, and how high the floor below it is. Thread safety: any
  thread.
  */
-NearmissStatus nearmiss_map_query(const NearmissSliceMap *map,
+NearmissStatus nearmiss_map_query(const struct NearmissSliceMap *map,
                                   const double (*min)[3],
                                   const double (*max)[3],
                                   struct NearmissOccupancy *out);
@@ -1405,10 +1534,10 @@ struct NearmissAvatar nearmiss_avatar(void);
  Puts an avatar's feet at a place where it can stand. `size` may be null. Thread safety: any thread;
  later, one call at a time.
  */
-NearmissStatus nearmiss_walker_new(const NearmissSliceMap *map,
+NearmissStatus nearmiss_walker_new(const struct NearmissSliceMap *map,
                                    const struct NearmissAvatar *size,
                                    const double (*start)[3],
-                                   NearmissOut_Walker out);
+                                   struct NearmissWalker **out);
 
 /*
  Frees a walker; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -1417,14 +1546,14 @@ NearmissStatus nearmiss_walker_new(const NearmissSliceMap *map,
  # Safety
  `walker` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_walker_free(NearmissWalker *walker);
+NearmissStatus nearmiss_walker_free(struct NearmissWalker *walker);
 
 /*
  Takes one step towards a place, given as two horizontal coordinates, and slides along walls. The
  map is that of the walker. Thread safety: one call at a time for each walker.
  */
-NearmissStatus nearmiss_walker_step(NearmissWalker *walker,
-                                    const NearmissSliceMap *map,
+NearmissStatus nearmiss_walker_step(struct NearmissWalker *walker,
+                                    const struct NearmissSliceMap *map,
                                     const double (*target)[2],
                                     struct NearmissStep *out);
 
@@ -1436,7 +1565,7 @@ NearmissStatus nearmiss_walker_step(NearmissWalker *walker,
  # Safety
  `out` are `2 · capacity` places; other pointers are null or valid.
  */
-NearmissStatus nearmiss_route(const NearmissSliceMap *map,
+NearmissStatus nearmiss_route(const struct NearmissSliceMap *map,
                               const struct NearmissAvatar *size,
                               const double (*from)[3],
                               const double (*to)[3],
@@ -1448,7 +1577,7 @@ NearmissStatus nearmiss_route(const NearmissSliceMap *map,
 /*
  Makes an empty world. Thread safety: any thread.
  */
-NearmissStatus nearmiss_world_new(NearmissOut_World out);
+NearmissStatus nearmiss_world_new(struct NearmissWorld **out);
 
 /*
  Frees a world; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -1457,25 +1586,25 @@ NearmissStatus nearmiss_world_new(NearmissOut_World out);
  # Safety
  `world` is null or a handle that no other call uses.
  */
-NearmissStatus nearmiss_world_free(NearmissWorld *world);
+NearmissStatus nearmiss_world_free(struct NearmissWorld *world);
 
 /*
  Adds a placed scan and writes its id to `out`. The world keeps the scan; its handle may be freed.
  Thread safety: no other call may use the world at the same time.
  */
-NearmissStatus nearmiss_world_insert(NearmissWorld *world,
+NearmissStatus nearmiss_world_insert(struct NearmissWorld *world,
                                      const struct NearmissPlaced *scan,
                                      uint64_t *out);
 
 /*
  Removes a body. Thread safety: no other call may use the world at the same time.
  */
-NearmissStatus nearmiss_world_remove(NearmissWorld *world, uint64_t id);
+NearmissStatus nearmiss_world_remove(struct NearmissWorld *world, uint64_t id);
 
 /*
  Moves a body. Thread safety: no other call may use the world at the same time.
  */
-NearmissStatus nearmiss_world_move(NearmissWorld *world,
+NearmissStatus nearmiss_world_move(struct NearmissWorld *world,
                                    uint64_t id,
                                    const struct NearmissPose *pose);
 
@@ -1487,11 +1616,11 @@ NearmissStatus nearmiss_world_move(NearmissWorld *world,
  # Safety
  `ids` are `id_count` numbers, `out` are `capacity` places; other pointers are null or valid.
  */
-NearmissStatus nearmiss_world_near_pairs(const NearmissWorld *world,
-                                         const NearmissPlan *plan,
+NearmissStatus nearmiss_world_near_pairs(const struct NearmissWorld *world,
+                                         const struct NearmissPlan *plan,
                                          const uint64_t *ids,
                                          size_t id_count,
-                                         NearmissScratch *scratch,
+                                         struct NearmissScratch *scratch,
                                          struct NearmissBodyPair *out,
                                          size_t capacity,
                                          size_t *count);
@@ -1500,12 +1629,12 @@ NearmissStatus nearmiss_world_near_pairs(const NearmissWorld *world,
  Decides whether two bodies touch, as `nearmiss_collide` does for two scans. Thread safety: one call
  at a time for each scratch and each hint.
  */
-NearmissStatus nearmiss_world_collide(const NearmissWorld *world,
-                                      const NearmissPlan *plan,
+NearmissStatus nearmiss_world_collide(const struct NearmissWorld *world,
+                                      const struct NearmissPlan *plan,
                                       struct NearmissBodyPair pair,
                                       const struct NearmissBudget *limits,
-                                      NearmissHint *hint,
-                                      NearmissScratch *scratch,
+                                      struct NearmissHint *hint,
+                                      struct NearmissScratch *scratch,
                                       struct NearmissAnswer *out);
 
 #ifdef __cplusplus

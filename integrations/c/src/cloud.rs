@@ -1,15 +1,16 @@
 //! Messages of ROS.
 
 use std::ffi::c_char;
+use std::mem::MaybeUninit;
 
 use nearmiss::io::{PointCloud2, PointCloud2View, PointField};
 
-use crate::handle::{Out, make};
+use crate::handle::make;
 use crate::pointer::{required, slice, text};
 use crate::scan::{PrepareOptions, Scan, nearmiss_prepare_options, prepare};
 use crate::status::{Failure, Status, guard};
 
-/// A field of a ROS PointField.
+/// A field of a ROS `PointField`.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct MessageField {
@@ -23,7 +24,7 @@ pub struct MessageField {
     pub count: u32,
 }
 
-/// The contents of a ROS PointCloud2. Nothing is copied.
+/// The contents of a ROS `PointCloud2`. Nothing is copied.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct Message {
@@ -47,7 +48,7 @@ pub struct Message {
     pub data_length: usize,
 }
 
-/// Prepares the points of a ROS PointCloud2, with its normals if it has any. Points that are not finite
+/// Prepares the points of a ROS `PointCloud2`, with its normals if it has any. Points that are not finite
 /// are dropped. `options` may be null. Thread safety: any thread.
 ///
 /// # Safety
@@ -56,7 +57,7 @@ pub struct Message {
 pub unsafe extern "C" fn nearmiss_scan_from_point_cloud2(
     message: Option<&Message>,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {

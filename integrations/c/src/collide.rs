@@ -80,7 +80,6 @@ pub struct ContactList {
 /// # Safety
 /// `list` is null or valid, and so are its places.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "those of `nearmiss_collide`, and the list")]
 pub unsafe extern "C" fn nearmiss_manifold(
     plan: Option<&Plan>,
     a: Option<&Placed<'_>>,

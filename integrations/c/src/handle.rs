@@ -13,8 +13,10 @@ const FREED: u64 = u64::from_le_bytes(*b"nm-freed");
 /// The number of freed handles whose memory is kept, so that their use is noticed.
 const KEPT: usize = 256;
 
-/// What a handle points to.
+/// The target of a handle. The mark comes first in handles of all kinds, so that one of another kind
+/// is recognised.
 #[derive(Debug)]
+#[repr(C)]
 pub(crate) struct Handle<T> {
     mark: AtomicU64,
     value: Option<T>,
@@ -34,13 +36,9 @@ pub(crate) trait Opaque: Sized + Send {
     fn handle_mut(&mut self) -> &mut Handle<Self::Value>;
 }
 
-/// Defines a kind of handle.
+/// Makes a struct a kind of handle. It is declared outside the macro, where cbindgen sees it.
 macro_rules! opaque {
-    ($(#[$about:meta])* $name:ident of $value:ty as $mark:literal) => {
-        $(#[$about])*
-        #[derive(Debug)]
-        pub struct $name($crate::handle::Handle<$value>);
-
+    ($name:ident of $value:ty as $mark:literal) => {
         impl $crate::handle::Opaque for $name {
             type Value = $value;
             const MARK: u64 = u64::from_le_bytes(*$mark);
@@ -95,12 +93,9 @@ pub(crate) fn get_mut<'a, H: Opaque>(
     handle.value.as_mut().ok_or_else(|| wrong::<H>(mark))
 }
 
-/// The place of a new handle, which is null if there is none.
-pub(crate) type Out<'a, H> = Option<&'a mut MaybeUninit<*mut H>>;
-
 /// Makes a value and writes its handle to `out`, or null if that fails.
 pub(crate) fn make<H: Opaque>(
-    out: Out<'_, H>,
+    out: Option<&mut MaybeUninit<*mut H>>,
     value: impl FnOnce() -> Result<H::Value, Failure>,
 ) -> Result<(), Failure> {
     let out = out.ok_or_else(|| Failure::null("out"))?;

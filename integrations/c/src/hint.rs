@@ -1,25 +1,28 @@
 //! Hints: what the last question found out, for the next similar one.
 
 use nearmiss::PairHint;
+use std::mem::MaybeUninit;
 
-use crate::handle::{Out, free, get_mut, make, opaque};
+use crate::handle::{Handle, free, get_mut, make, opaque};
 use crate::status::{Status, guard};
 
-opaque! {
-    /// What the last question about a pair of scans found out. Keep one for each pair whose poses
-    /// change little between questions. It never changes a verdict, except one that a budget ends.
-    Hint of PairHint as b"nm-hint."
-}
+/// The findings of the last question about a pair of scans. Keep one for each pair whose poses
+/// change little between questions. It never changes a verdict, except one that a budget ends.
+#[derive(Debug)]
+pub struct Hint(Handle<PairHint>);
 
-opaque! {
-    /// The contacts of a shape and a scan in the last frame. Keep one for each pair: contacts keep
-    /// their ids, and the shape its side of a surface.
-    ShapeHint of nearmiss::ShapeHint as b"nm-shape"
-}
+opaque!(Hint of PairHint as b"nm-hint.");
+
+/// The contacts of a shape and a scan in the last frame. Keep one for each pair: contacts keep
+/// their ids, and the shape its side of a surface.
+#[derive(Debug)]
+pub struct ShapeHint(Handle<nearmiss::ShapeHint>);
+
+opaque!(ShapeHint of nearmiss::ShapeHint as b"nm-shape");
 
 /// Makes a hint for a pair of scans. Thread safety: any thread; later, one call at a time.
 #[unsafe(no_mangle)]
-pub extern "C" fn nearmiss_hint_new(out: Out<'_, Hint>) -> Status {
+pub extern "C" fn nearmiss_hint_new(out: Option<&mut MaybeUninit<*mut Hint>>) -> Status {
     guard(|| make(out, || Ok(PairHint::default())))
 }
 
@@ -35,7 +38,7 @@ pub unsafe extern "C" fn nearmiss_hint_free(hint: *mut Hint) -> Status {
 
 /// Makes a hint for a shape and a scan. Thread safety: any thread; later, one call at a time.
 #[unsafe(no_mangle)]
-pub extern "C" fn nearmiss_shape_hint_new(out: Out<'_, ShapeHint>) -> Status {
+pub extern "C" fn nearmiss_shape_hint_new(out: Option<&mut MaybeUninit<*mut ShapeHint>>) -> Status {
     guard(|| make(out, || Ok(nearmiss::ShapeHint::default())))
 }
 

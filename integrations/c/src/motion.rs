@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 use nearmiss::{Prepared as _, Sweep, SweepReason, SweepVerdict};
 
 use crate::answer::{Contact, NONE, NOWHERE, Reason, Verdict, evidence};
-use crate::handle::{Out, free, get, get_mut, make, opaque};
+use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::options::{Budget, Evidence, budget};
 use crate::plan::Plan;
 use crate::pointer::{slice, write};
@@ -14,10 +14,11 @@ use crate::scan::Scan;
 use crate::scratch::Scratch;
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// A motion through poses. Any number of threads may use one at the same time.
-    Motion of nearmiss::Motion as b"nm-motio"
-}
+/// A motion through poses. Any number of threads may use one at the same time.
+#[derive(Debug)]
+pub struct Motion(Handle<nearmiss::Motion>);
+
+opaque!(Motion of nearmiss::Motion as b"nm-motio");
 
 /// The answer about a motion. Missing numbers are NaN. Times count poses, with fractions.
 #[derive(Debug, Clone, Copy)]
@@ -90,7 +91,7 @@ impl SweepAnswer {
 pub unsafe extern "C" fn nearmiss_motion_new(
     poses: *const Pose,
     count: usize,
-    out: Out<'_, Motion>,
+    out: Option<&mut MaybeUninit<*mut Motion>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -115,7 +116,6 @@ pub unsafe extern "C" fn nearmiss_motion_free(motion: *mut Motion) -> Status {
 /// Proves that two scans stay apart, by more than the margin of the plan, along their motions, or
 /// finds the first impact. `limits` may be null. Thread safety: one call at a time for each scratch.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "two scans and two motions")]
 pub extern "C" fn nearmiss_sweep(
     plan: Option<&Plan>,
     a: Option<&Scan>,

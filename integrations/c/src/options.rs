@@ -44,17 +44,17 @@ pub enum Detail {
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct Options {
-    /// A NearmissSemantics.
+    /// A `NearmissSemantics`.
     pub semantics: i32,
-    /// The wanted NearmissEvidence of separations.
+    /// The wanted `NearmissEvidence` of separations.
     pub evidence: i32,
-    /// A NearmissDetail.
+    /// A `NearmissDetail`.
     pub detail: i32,
-    /// The radius of balls with NEARMISS_SEMANTICS_THICKENED.
+    /// The radius of balls with `NEARMISS_SEMANTICS_THICKENED`.
     pub thickness: f64,
     /// Nearer than this counts as touching; of a sweep, the distance to keep.
     pub margin: f64,
-    /// How far a lower bound of a distance may stay below the upper one, as a share of it.
+    /// The share of the upper bound of a distance by which the lower one may stay below it.
     pub relative: f64,
 }
 
@@ -122,7 +122,7 @@ pub(crate) fn budget(given: Option<&Budget>) -> Result<nearmiss::Budget, Failure
     if seconds == f64::INFINITY {
         return Ok(budget);
     }
-    if !(seconds >= 0.0) {
+    if seconds.is_nan() || seconds < 0.0 {
         return Err(Failure::argument(format_args!("expected seconds of at least 0, got {seconds}")));
     }
     let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);

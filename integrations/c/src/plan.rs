@@ -1,8 +1,9 @@
 //! Plans: validated options.
 
 use nearmiss::{CollidePlan, DistanceOptions, DistancePlan, ShapePlan, SweepOptions, SweepPlan};
+use std::mem::MaybeUninit;
 
-use crate::handle::{Out, free, get, make, opaque};
+use crate::handle::{Handle, free, get, make, opaque};
 use crate::options::{Options, nearmiss_options};
 use crate::scan::Scan;
 use crate::status::{Failure, Status, guard};
@@ -16,11 +17,12 @@ pub(crate) struct Plans {
     pub(crate) sweep: SweepPlan,
 }
 
-opaque! {
-    /// Validated options. A plan serves every question, about any scans prepared in the same way as
-    /// those that it was made for, in any poses. Any number of threads may use one at the same time.
-    Plan of Plans as b"nm-plan."
-}
+/// Validated options. A plan serves every question, about any scans prepared in the same way as
+/// those that it was made for, in any poses. Any number of threads may use one at the same time.
+#[derive(Debug)]
+pub struct Plan(Handle<Plans>);
+
+opaque!(Plan of Plans as b"nm-plan.");
 
 /// Validates options, for `a` and `b` and all scans prepared for the same kernel. `options` may be
 /// null. Thread safety: any thread.
@@ -29,7 +31,7 @@ pub extern "C" fn nearmiss_plan_new(
     options: Option<&Options>,
     a: Option<&Scan>,
     b: Option<&Scan>,
-    out: Out<'_, Plan>,
+    out: Option<&mut MaybeUninit<*mut Plan>>,
 ) -> Status {
     guard(|| {
         make(out, || {

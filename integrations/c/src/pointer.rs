@@ -84,7 +84,8 @@ pub(crate) unsafe fn text<'a>(text: *const c_char, name: &str) -> Result<&'a str
     }
     // SAFETY: it is not null, and the caller promises the zero byte.
     let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map_err(|_| Failure::argument(format_args!("expected UTF-8 for `{name}`, got other bytes")))
+    text.to_str()
+        .map_err(|_bytes| Failure::argument(format_args!("expected UTF-8 for `{name}`, got other bytes")))
 }
 
 /// Returns the path at a pointer.

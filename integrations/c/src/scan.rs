@@ -7,14 +7,15 @@ use nearmiss::io::ReadError;
 use nearmiss::store::{ContainerFault, OpenError, WriteError};
 use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud};
 
-use crate::handle::{Out, free, get, make, opaque};
+use crate::handle::{Handle, free, get, make, opaque};
 use crate::pointer::{fill, path, slice, write};
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// A prepared scan. Any number of threads may use one at the same time.
-    Scan of nearmiss::Scan as b"nm-scan."
-}
+/// A prepared scan. Any number of threads may use one at the same time.
+#[derive(Debug)]
+pub struct Scan(Handle<nearmiss::Scan>);
+
+opaque!(Scan of nearmiss::Scan as b"nm-scan.");
 
 /// How a scan is prepared. Start from `nearmiss_prepare_options`.
 #[derive(Debug, Clone, Copy)]
@@ -107,7 +108,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_points(
     points: *const f64,
     count: usize,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -126,7 +127,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_floats(
     points: *const f32,
     count: usize,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -145,7 +146,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_floats(
 pub unsafe extern "C" fn nearmiss_scan_read(
     file: *const c_char,
     options: Option<&PrepareOptions>,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -180,13 +181,17 @@ fn check(checks: i32) -> Result<Check, Failure> {
     }
 }
 
-/// Opens a prepared file by mapping it; `checks` is a NearmissChecks. The file must not be changed in
+/// Opens a prepared file by mapping it; `checks` is a `NearmissChecks`. The file must not be changed in
 /// place while it is open; saving over it is fine. Thread safety: any thread.
 ///
 /// # Safety
 /// `file` is null or text that ends with a zero byte; `out` is null or valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nearmiss_scan_open(file: *const c_char, checks: i32, out: Out<'_, Scan>) -> Status {
+pub unsafe extern "C" fn nearmiss_scan_open(
+    file: *const c_char,
+    checks: i32,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
+) -> Status {
     guard(|| {
         make(out, || {
             // SAFETY: the caller promises the text.
@@ -195,7 +200,7 @@ pub unsafe extern "C" fn nearmiss_scan_open(file: *const c_char, checks: i32, ou
     })
 }
 
-/// Loads a scan from the bytes of a prepared file, which are copied; `checks` is a NearmissChecks.
+/// Loads a scan from the bytes of a prepared file, which are copied; `checks` is a `NearmissChecks`.
 /// Thread safety: any thread.
 ///
 /// # Safety
@@ -205,7 +210,7 @@ pub unsafe extern "C" fn nearmiss_scan_from_bytes(
     bytes: *const u8,
     length: usize,
     checks: i32,
-    out: Out<'_, Scan>,
+    out: Option<&mut MaybeUninit<*mut Scan>>,
 ) -> Status {
     guard(|| {
         make(out, || {

@@ -1,8 +1,9 @@
 //! Scratch memory.
 
 use nearmiss::{BodyId, Contacts, ManifoldPoint, RayHit, ShapeContact};
+use std::mem::MaybeUninit;
 
-use crate::handle::{Out, free, make, opaque};
+use crate::handle::{Handle, free, make, opaque};
 use crate::status::{Status, guard};
 
 /// The memory of a thread's questions, and of their outputs.
@@ -17,15 +18,16 @@ pub(crate) struct Memory {
     pub(crate) ids: Vec<BodyId>,
 }
 
-opaque! {
-    /// Working memory of questions. Make one for each thread, and reuse it: a question does not
-    /// allocate once its scratch is warm. It serves every question and never changes an answer.
-    Scratch of Memory as b"nm-scrat"
-}
+/// Working memory of questions. Make one for each thread, and reuse it: a question does not
+/// allocate once its scratch is warm. It serves every question and never changes an answer.
+#[derive(Debug)]
+pub struct Scratch(Handle<Memory>);
+
+opaque!(Scratch of Memory as b"nm-scrat");
 
 /// Makes scratch memory. Thread safety: any thread; later, one call at a time.
 #[unsafe(no_mangle)]
-pub extern "C" fn nearmiss_scratch_new(out: Out<'_, Scratch>) -> Status {
+pub extern "C" fn nearmiss_scratch_new(out: Option<&mut MaybeUninit<*mut Scratch>>) -> Status {
     guard(|| make(out, || Ok(Memory::default())))
 }
 

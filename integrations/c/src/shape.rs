@@ -30,7 +30,7 @@ pub enum ShapeKind {
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct Shape {
-    /// A NearmissShapeKind.
+    /// A `NearmissShapeKind`.
     pub kind: i32,
     /// The pose of a box, a cylinder or a cone.
     pub pose: Pose,

@@ -10,14 +10,15 @@ use nearmiss::slices::{
 };
 
 use crate::answer::NONE;
-use crate::handle::{Out, free, get, make, opaque};
+use crate::handle::{Handle, free, get, make, opaque};
 use crate::pointer::{path, required, slice, text, write};
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// A building as a stack of images. Any number of threads may use one at the same time.
-    SliceMap of Map as b"nm-slice"
-}
+/// A building as a stack of images. Any number of threads may use one at the same time.
+#[derive(Debug)]
+pub struct SliceMap(Handle<Map>);
+
+opaque!(SliceMap of Map as b"nm-slice");
 
 /// How a map is built. Start from `nearmiss_map_options`. Lengths are in the units of the points.
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +77,7 @@ pub unsafe extern "C" fn nearmiss_map_from_points(
     points: *const f64,
     count: usize,
     options: Option<&MapOptions>,
-    out: Out<'_, SliceMap>,
+    out: Option<&mut MaybeUninit<*mut SliceMap>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -109,7 +110,10 @@ pub unsafe extern "C" fn nearmiss_map_from_points(
 /// # Safety
 /// `folder` is null or text that ends with a zero byte; `out` is null or valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nearmiss_map_open(folder: *const c_char, out: Out<'_, SliceMap>) -> Status {
+pub unsafe extern "C" fn nearmiss_map_open(
+    folder: *const c_char,
+    out: Option<&mut MaybeUninit<*mut SliceMap>>,
+) -> Status {
     guard(|| {
         make(out, || {
             // SAFETY: the caller promises the text.

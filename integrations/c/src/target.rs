@@ -176,7 +176,8 @@ impl Ray {
     fn checked(&self) -> Result<nearmiss::Ray, Failure> {
         let Self { origin, direction, max, radius } = *self;
         let is_finite = origin.iter().chain(&direction).all(|c| c.is_finite());
-        if !is_finite || direction == [0.0; 3] || !(max >= 0.0) || !(radius >= 0.0 && radius.is_finite()) {
+        let are_lengths = max >= 0.0 && radius >= 0.0 && radius.is_finite();
+        if !is_finite || direction == [0.0; 3] || !are_lengths {
             return Err(Failure::argument(format_args!(
                 "expected a finite origin, a finite direction other than 0, and lengths of at least 0, got {self:?}"
             )));
@@ -252,7 +253,7 @@ pub unsafe extern "C" fn nearmiss_shape_distance(
 ) -> Status {
     guard(|| {
         let (target, memory) = (target(plan, scan)?, get_mut(scratch, "scratch")?);
-        if !(within >= 0.0) {
+        if within.is_nan() || within < 0.0 {
             return Err(Failure::argument(format_args!("expected a reach of at least 0, got {within}")));
         }
         // SAFETY: the caller promises shapes, their points and places.
@@ -272,7 +273,6 @@ pub unsafe extern "C" fn nearmiss_shape_distance(
 /// # Safety
 /// `out` are `capacity` places; other pointers are null or valid.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "a question, its memory and a list")]
 pub unsafe extern "C" fn nearmiss_shape_contacts(
     plan: Option<&Plan>,
     scan: Option<&Placed<'_>>,

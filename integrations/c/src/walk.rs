@@ -5,15 +5,16 @@ use std::mem::MaybeUninit;
 use nearmiss::slices::{AvatarOptions, Route, Slide, Walker as Walking};
 
 use crate::answer::NONE;
-use crate::handle::{Out, free, get, get_mut, make, opaque};
+use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::pointer::{fill, required, write};
 use crate::slices::{SliceMap, unloaded};
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// An avatar somewhere in a map.
-    Walker of Walking as b"nm-walke"
-}
+/// An avatar somewhere in a map.
+#[derive(Debug)]
+pub struct Walker(Handle<Walking>);
+
+opaque!(Walker of Walking as b"nm-walke");
 
 /// The size of an avatar. Start from `nearmiss_avatar`.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +62,7 @@ pub extern "C" fn nearmiss_walker_new(
     map: Option<&SliceMap>,
     size: Option<&Avatar>,
     start: Option<&[f64; 3]>,
-    out: Out<'_, Walker>,
+    out: Option<&mut MaybeUninit<*mut Walker>>,
 ) -> Status {
     guard(|| {
         make(out, || {
@@ -108,7 +109,6 @@ pub extern "C" fn nearmiss_walker_step(
 /// # Safety
 /// `out` are `2 · capacity` places; other pointers are null or valid.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "a question and a list")]
 pub unsafe extern "C" fn nearmiss_route(
     map: Option<&SliceMap>,
     size: Option<&Avatar>,

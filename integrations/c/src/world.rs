@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 use nearmiss::{Bodies, BodyId};
 
 use crate::answer::Answer;
-use crate::handle::{Out, free, get, get_mut, make, opaque};
+use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::hint::Hint;
 use crate::options::{Budget, budget};
 use crate::plan::Plan;
@@ -14,11 +14,12 @@ use crate::pose::{Placed, Pose};
 use crate::scratch::Scratch;
 use crate::status::{Failure, Status, guard};
 
-opaque! {
-    /// Placed scans, each a body with an id. Any number of threads may ask at the same time, while none
-    /// changes it.
-    World of nearmiss::World<nearmiss::Scan> as b"nm-world"
-}
+/// Placed scans, each a body with an id. Any number of threads may ask at the same time, while none
+/// changes it.
+#[derive(Debug)]
+pub struct World(Handle<nearmiss::World<nearmiss::Scan>>);
+
+opaque!(World of nearmiss::World<nearmiss::Scan> as b"nm-world");
 
 /// The ids of two bodies, the smaller one first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +37,7 @@ fn no_body(id: u64) -> Failure {
 
 /// Makes an empty world. Thread safety: any thread.
 #[unsafe(no_mangle)]
-pub extern "C" fn nearmiss_world_new(out: Out<'_, World>) -> Status {
+pub extern "C" fn nearmiss_world_new(out: Option<&mut MaybeUninit<*mut World>>) -> Status {
     guard(|| make(out, || Ok(nearmiss::World::new())))
 }
 
@@ -89,7 +90,6 @@ pub extern "C" fn nearmiss_world_move(world: Option<&mut World>, id: u64, pose: 
 /// # Safety
 /// `ids` are `id_count` numbers, `out` are `capacity` places; other pointers are null or valid.
 #[unsafe(no_mangle)]
-#[expect(clippy::too_many_arguments, reason = "a question, its memory and two lists")]
 pub unsafe extern "C" fn nearmiss_world_near_pairs(
     world: Option<&World>,
     plan: Option<&Plan>,

@@ -2,6 +2,8 @@
 #include "check.h"
 
 #include <cmath>
+#include <cstdio>
+#include <cstring>
 #include <memory>
 #include <thread>
 #include <vector>

@@ -39,7 +39,7 @@ pub(crate) fn doubles<'py>(
         )));
     };
     let array = array.call_method1("astype", ("float64",))?;
-    numpy(given.py())?.call_method1("ascontiguousarray", (array,))?.extract().map_err(Into::into)
+    numpy(given.py())?.call_method1("ascontiguousarray", (array,))?.extract()
 }
 
 impl<'py> Points<'py> {
@@ -51,7 +51,7 @@ impl<'py> Points<'py> {
             _ => {
                 let array = doubles(given, EXPECTED)?;
                 let array = array.extract::<PyReadonlyArray2<'py, f64>>();
-                Self::Double(array.map_err(|_| wrong_shape(EXPECTED, given))?)
+                Self::Double(array.map_err(|_shape| wrong_shape(EXPECTED, given))?)
             }
         };
         let shape = match &points {
@@ -113,5 +113,5 @@ pub(crate) fn vector(given: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]>
     let expected = format!("three numbers for {name}");
     let array = doubles(given, &expected)?;
     let numbers = array.as_slice().map_err(refused)?;
-    <[f64; 3]>::try_from(numbers).map_err(|_| wrong_shape(&expected, given))
+    <[f64; 3]>::try_from(numbers).map_err(|_shape| wrong_shape(&expected, given))
 }

@@ -50,9 +50,12 @@ impl<'py> Data<'py> {
                 "expected the data of the message as bytes, an array of uint8 or a buffer; pass `message.data`",
             )
         };
-        let array =
-            given.py().import("numpy")?.call_method1("frombuffer", (given, "u1")).map_err(|_| expected())?;
-        Ok(Self::Array(array.extract().map_err(|_| expected())?))
+        let array = given
+            .py()
+            .import("numpy")?
+            .call_method1("frombuffer", (given, "u1"))
+            .map_err(|_cause| expected())?;
+        Ok(Self::Array(array.extract().map_err(|_cause| expected())?))
     }
 
     fn slice(&self) -> PyResult<&[u8]> {

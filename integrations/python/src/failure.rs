@@ -11,7 +11,6 @@ use pyo3::PyErr;
 use pyo3::exceptions::{PyOSError, PyValueError};
 
 /// Returns a `ValueError` with the message of an error.
-#[expect(clippy::needless_pass_by_value, reason = "what `map_err` takes")]
 pub(crate) fn refused(cause: impl Display) -> PyErr {
     PyValueError::new_err(cause.to_string())
 }
@@ -25,7 +24,6 @@ fn system(cause: &impl Display, system: &io::Error) -> PyErr {
 }
 
 /// Returns the exception of a file that cannot be read.
-#[expect(clippy::needless_pass_by_value, reason = "what `map_err` takes")]
 pub(crate) fn unreadable(cause: ReadError) -> PyErr {
     match &cause {
         ReadError::Io { cause: inner, .. } => system(&cause, inner),
@@ -34,7 +32,6 @@ pub(crate) fn unreadable(cause: ReadError) -> PyErr {
 }
 
 /// Returns the exception of a prepared file that cannot be opened.
-#[expect(clippy::needless_pass_by_value, reason = "what `map_err` takes")]
 pub(crate) fn unloadable(cause: LoadError) -> PyErr {
     match &cause {
         LoadError::Open(OpenError { fault: ContainerFault::Io { source }, .. }) => system(&cause, source),
@@ -43,7 +40,6 @@ pub(crate) fn unloadable(cause: LoadError) -> PyErr {
 }
 
 /// Returns the exception of a file that cannot be written.
-#[expect(clippy::needless_pass_by_value, reason = "what `map_err` takes")]
 pub(crate) fn unwritable(cause: SaveError) -> PyErr {
     match &cause {
         WriteError::Io { source, .. } => system(&cause, source),
@@ -52,7 +48,6 @@ pub(crate) fn unwritable(cause: SaveError) -> PyErr {
 }
 
 /// Returns the exception of a folder of slices that cannot be read or written.
-#[expect(clippy::needless_pass_by_value, reason = "what `map_err` takes")]
 pub(crate) fn unstored(cause: StoreError) -> PyErr {
     match &cause {
         StoreError::Open(OpenError { fault: ContainerFault::Io { source }, .. })

@@ -48,7 +48,7 @@ impl ShapeHint {
 
     /// Forgets all contacts.
     fn clear(&self) -> PyResult<()> {
-        self.0.try_lock().map_err(|_| busy())?.clear();
+        self.0.try_lock().map_err(|_busy| busy())?.clear();
         Ok(())
     }
 }

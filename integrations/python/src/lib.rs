@@ -15,6 +15,7 @@ mod poses;
 mod shape_answers;
 
 mod prepare;
+mod recipe;
 mod shape;
 
 mod cloud;

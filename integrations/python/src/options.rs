@@ -91,7 +91,7 @@ impl Options {
             "work" => self.work = Some(value.extract()?),
             "seconds" => {
                 let seconds: f64 = value.extract()?;
-                if !(seconds >= 0.0) {
+                if seconds.is_nan() || seconds < 0.0 {
                     return Err(refused(format!("expected a time of at least 0 seconds, got {seconds}")));
                 }
                 self.seconds = Some(seconds);

@@ -19,7 +19,7 @@ pub(crate) enum Poses<'py> {
     Many(PyReadonlyArrayDyn<'py, f64>),
 }
 
-/// What errors say was expected.
+/// The forms of poses, in errors.
 const EXPECTED: &str = "a pose of shape (4, 4), poses of shape (N, 4, 4), a rotation with as_matrix(), or a pair (rotation, translation)";
 
 const IDENTITY: Matrix = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];

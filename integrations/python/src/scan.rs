@@ -3,21 +3,21 @@
 use std::path::PathBuf;
 
 use nearmiss::{
-    Answer as ScanAnswer, BuildOptions, Check, CollidePlan, Contacts, DistanceOptions, DistancePlan,
-    GraphOptions, Pair, Paths, PointCloud, Pose, Scan as Prepared, Workspace,
+    Answer as ScanAnswer, Check, CollidePlan, Contacts, DistanceOptions, DistancePlan, Pair, Pose,
+    Scan as Prepared,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::answers::{Answer, AnswerRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord};
-use crate::arrays::{Points, vector};
+use crate::arrays::Points;
 use crate::cloud::rows;
 use crate::failure::{refused, unloadable, unreadable, unwritable};
 use crate::hint::{Hint, busy};
 use crate::options::{OF_DISTANCE, OF_SCANS, OF_SHAPES, Options};
 use crate::pool::{ask, ask_each};
 use crate::poses::{Matrix, Poses, check_each, pose_of};
-use crate::prepare::watched;
+use crate::recipe::Recipe;
 use crate::record::array;
 use crate::target::Target;
 
@@ -25,72 +25,6 @@ use crate::target::Target;
 #[pyclass(frozen, module = "nearmiss")]
 #[derive(Debug)]
 pub(crate) struct Scan(pub(crate) Prepared);
-
-/// How a scan is prepared, read from keywords.
-struct Recipe {
-    build: BuildOptions,
-    graph: Option<(GraphOptions, Option<[f64; 3]>)>,
-}
-
-impl Recipe {
-    /// The names of the options.
-    const NAMES: [&str; 5] = ["radius_neighbours", "reach", "graph", "close_pairs", "scanner"];
-
-    fn new(given: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut recipe = Self { build: BuildOptions::default(), graph: None };
-        let Some(given) = given else { return Ok(recipe) };
-        if let Some(unknown) = given
-            .keys()
-            .iter()
-            .map(|name| name.to_string())
-            .find(|name| !Self::NAMES.contains(&name.as_str()))
-        {
-            let known = Self::NAMES.join(", ");
-            return Err(pyo3::exceptions::PyTypeError::new_err(format!(
-                "expected options among {known}, got `{unknown}`"
-            )));
-        }
-        let of = |name: &str| given.get_item(name).map(|value| value.filter(|value| !value.is_none()));
-        if let Some(neighbours) = of("radius_neighbours")? {
-            recipe.build = recipe.build.with_radius_neighbours(neighbours.extract()?);
-        }
-        if let Some(reach) = of("reach")? {
-            recipe.build = recipe.build.with_reach(reach.extract()?);
-        }
-        let is_set = |name: &str| of(name)?.map_or(Ok(false), |value| value.is_truthy());
-        let scanner = of("scanner")?.map(|place| vector(&place, "the scanner")).transpose()?;
-        let close_pairs = is_set("close_pairs")?;
-        if is_set("graph")? || close_pairs || scanner.is_some() {
-            let paths = close_pairs.then_some(Paths::Rebuilt);
-            recipe.graph = Some((GraphOptions::default().with_close_pairs(paths), scanner));
-        }
-        Ok(recipe)
-    }
-
-    /// Prepares a cloud, watched.
-    fn prepare(
-        self,
-        py: Python<'_>,
-        cloud: PointCloud,
-        told: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Prepared> {
-        let work = Workspace::in_memory();
-        let progress = work.progress().clone();
-        let whole = watched(py, told, &progress, move || {
-            let scan = Prepared::build_in(&(&cloud).into(), &self.build, &work)
-                .map_err(|cause| cause.to_string())?;
-            match &self.graph {
-                None => Ok(scan),
-                Some((options, scanner)) => {
-                    work.progress().reach(0.0);
-                    let scan = scan.with_graph_watched(&cloud, options, *scanner, work.progress());
-                    scan.map_err(|cause| cause.to_string())
-                }
-            }
-        })?;
-        whole.map_err(refused)
-    }
-}
 
 /// The poses of both scans of a batch; one pose serves all.
 pub(crate) struct PosePairs<'a> {
@@ -175,7 +109,7 @@ impl Scan {
     /// Prepare points of shape (N, 3), float32 or float64; those that are contiguous are not copied.
     ///
     /// `normals` has shape (N, 3). `drop_invalid` drops points that are not finite, which raise
-    /// ValueError otherwise. `progress` is called with the share that is done, from 0 to 1. Options:
+    /// `ValueError` otherwise. `progress` is called with the share that is done, from 0 to 1. Options:
     /// `radius_neighbours` (3 to 32, default 6), `reach` (the widest gap that is bridged, a length),
     /// `graph` (orient the normals), `scanner` (a position of shape (3,) that normals face; implies
     /// `graph`), `close_pairs` (distances along the surface; implies `graph`). Takes about 1.5 s for a
@@ -343,7 +277,7 @@ impl Scan {
         let (py, other) = (other.py(), other.get());
         let (plan, options) = self.plan(other, options)?;
         let [a, b] = self.both(other, pose, own_pose)?;
-        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_busy| busy())).transpose()?;
         let hint = hint.as_deref_mut();
         let answer = ask(py, |scratch| {
             let pair = Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget());
@@ -471,7 +405,7 @@ impl Scan {
         let (py, other) = (other.py(), other.get());
         let (plan, options) = self.plan(other, options)?;
         let [a, b] = self.both(other, pose, own_pose)?;
-        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_busy| busy())).transpose()?;
         let hint = hint.as_deref_mut();
         let mut found = Vec::new();
         ask(py, |scratch| {

@@ -129,7 +129,7 @@ impl Shape {
         let corners = Points::new(points)?.to_doubles()?;
         let corners = <[[f64; 3]; 3]>::try_from(corners);
         let corners =
-            corners.map_err(|_| wrong_shape("the corners of a triangle, of shape (3, 3)", points))?;
+            corners.map_err(|_shape| wrong_shape("the corners of a triangle, of shape (3, 3)", points))?;
         Self::checked(Kind::Triangle(corners), rounding)
     }
 

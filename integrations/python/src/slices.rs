@@ -160,18 +160,17 @@ impl SliceMap {
     /// Find a short route that an avatar can walk between two places of shape (3,).
     ///
     /// Returns the points to walk to, of shape (N, 2), the end of shape (3,), and the length. Raises
-    /// ValueError if there is no route; the message says how near it gets.
+    /// `ValueError` if there is no route; the message says how near it gets.
     #[pyo3(signature = (start, goal, *, size = [0.4, 0.4, 1.6], climb = 0.35, falls = false))]
     fn route<'py>(
         &self,
-        py: Python<'py>,
         start: &Bound<'py, PyAny>,
         goal: &Bound<'py, PyAny>,
         size: [f64; 3],
         climb: f64,
         falls: bool,
     ) -> PyResult<(Bound<'py, PyAny>, [f64; 3], f64)> {
-        let avatar = avatar(size, climb)?;
+        let (py, avatar) = (start.py(), avatar(size, climb)?);
         let ends = [vector(start, "the start")?, vector(goal, "the goal")?];
         let found = py.detach(|| Route::find(&self.0, &avatar, ends, falls)).map_err(refused)?;
         let points = &found.route.points;

@@ -31,7 +31,7 @@ fn motion(given: Option<&Bound<'_, PyAny>>, scan: &Prepared) -> PyResult<Motion>
 /// `a` moves through the poses `path_a`, `b` through `path_b`, of shape (N, 4, 4), by screws; pose k is
 /// reached at time k. A single pose of shape (4, 4) stays. `clearance` is the distance that they keep, a
 /// length. Options: `thickened`, `surface_only`, `work`, `seconds`, as for `Scan.collide`. Returns a
-/// SweepAnswer, whose times count poses.
+/// `SweepAnswer`, whose times count poses.
 #[pyfunction]
 #[pyo3(signature = (a, b, path_b, path_a = None, *, clearance = 0.0, **options))]
 pub(crate) fn sweep(

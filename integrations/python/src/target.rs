@@ -39,7 +39,7 @@ impl Target {
         given: &Bound<'py, PyAny>,
         question: impl Fn(&nearmiss::Target<'_>, &nearmiss::Shape<'_>, &mut Scratch) -> R + Sync,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let kept: Vec<Bound<'py, Shape>> = given.extract().map_err(|_| {
+        let kept: Vec<Bound<'py, Shape>> = given.extract().map_err(|_cause| {
             refused("expected a sequence of Shape, got something else; make them, as by Shape.sphere")
         })?;
         let shapes: Vec<nearmiss::Shape<'_>> = kept.iter().map(|shape| shape.get().convex()).collect();
@@ -79,7 +79,7 @@ impl Target {
 
 /// Checks the greatest length and the radius of rays.
 fn check_lengths(max: f64, radius: f64) -> PyResult<()> {
-    if !(max >= 0.0) {
+    if max.is_nan() || max < 0.0 {
         return Err(refused(format!("expected a greatest length of rays of at least 0, got {max}")));
     }
     if !(radius >= 0.0 && radius.is_finite()) {
@@ -104,20 +104,20 @@ impl Target {
         format!("<Target: {} points at {:?}>", self.scan.len(), self.pose.translation())
     }
 
-    /// Decide whether a shape touches the scan. Returns a ShapeAnswer.
+    /// Decide whether a shape touches the scan. Returns a `ShapeAnswer`.
     fn touch(&self, shape: &Bound<'_, Shape>) -> ShapeAnswer {
         let convex = shape.get().convex();
         ShapeAnswer(ask(shape.py(), |scratch| ShapeRecord::new(&self.at().touch(&convex, scratch))))
     }
 
     /// Answer `touch` for a sequence of shapes on all cores. Returns a structured array of shape (N,)
-    /// with the fields of a ShapeAnswer.
+    /// with the fields of a `ShapeAnswer`.
     fn touch_each<'py>(&self, shapes: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         self.each(shapes, |target, shape, scratch| ShapeRecord::new(&target.touch(shape, scratch)))
     }
 
     /// Bound the distance of a shape and the scan: lower ≤ distance ≤ upper. Both are infinite if
-    /// nothing is within the length `within`. Returns a ShapeDistance.
+    /// nothing is within the length `within`. Returns a `ShapeDistance`.
     #[pyo3(signature = (shape, within = f64::INFINITY))]
     fn distance(&self, shape: &Bound<'_, Shape>, within: f64) -> PyResult<ShapeDistance> {
         check_reach(within)?;
@@ -129,7 +129,7 @@ impl Target {
     }
 
     /// Answer `distance` for a sequence of shapes on all cores. Returns a structured array of shape
-    /// (N,) with the fields of a ShapeDistance.
+    /// (N,) with the fields of a `ShapeDistance`.
     #[pyo3(signature = (shapes, within = f64::INFINITY))]
     fn distance_each<'py>(&self, shapes: &Bound<'py, PyAny>, within: f64) -> PyResult<Bound<'py, PyAny>> {
         check_reach(within)?;
@@ -150,7 +150,7 @@ impl Target {
         hint: Option<&Bound<'py, ShapeHint>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let shape = shape.get().convex();
-        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_| busy())).transpose()?;
+        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_busy| busy())).transpose()?;
         let hint = hint.as_deref_mut();
         let mut found = Vec::new();
         ask(py, |scratch| match hint {
@@ -163,7 +163,7 @@ impl Target {
     /// Find the first place where a ray, or a ball of `radius` along it, hits the scan.
     ///
     /// `origin` and `direction` have shape (3,); the direction need not be a unit vector. `max` is the
-    /// greatest length. Returns a RayAnswer, whose `t` is a length.
+    /// greatest length. Returns a `RayAnswer`, whose `t` is a length.
     #[pyo3(signature = (origin, direction, *, max = f64::INFINITY, radius = 0.0))]
     fn cast(
         &self,
@@ -178,7 +178,7 @@ impl Target {
 
     /// Answer `cast` for many rays on all cores. `origins` and `directions` have shape (N, 3); one of
     /// them may have shape (3,). Returns a structured array of shape (N,) with the fields of a
-    /// RayAnswer; `t` is NaN where nothing is hit.
+    /// `RayAnswer`; `t` is NaN where nothing is hit.
     #[pyo3(signature = (origins, directions, *, max = f64::INFINITY, radius = 0.0))]
     fn cast_each<'py>(
         &self,
@@ -193,7 +193,7 @@ impl Target {
     }
 
     /// Return all places where one ray hits the scan, the nearest first, as a structured array of
-    /// shape (N,) with the fields of a RayAnswer.
+    /// shape (N,) with the fields of a `RayAnswer`.
     #[pyo3(signature = (origin, direction, *, max = f64::INFINITY, radius = 0.0))]
     fn cast_all<'py>(
         &self,

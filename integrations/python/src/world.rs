@@ -75,12 +75,12 @@ impl World {
         Ok(self.with(|world| world.insert(scan.clone(), &pose).0))
     }
 
-    /// Remove a body. Raises KeyError for an unknown id.
+    /// Remove a body. Raises `KeyError` for an unknown id.
     fn remove(&self, id: u64) -> PyResult<()> {
         self.with(|world| world.remove(BodyId(id))).map(drop).ok_or_else(|| no_body(id))
     }
 
-    /// Move a body to `pose`, of shape (4, 4). Raises KeyError for an unknown id.
+    /// Move a body to `pose`, of shape (4, 4). Raises `KeyError` for an unknown id.
     fn move_to(&self, id: u64, pose: &Bound<'_, PyAny>) -> PyResult<()> {
         let pose = self.pose(id, Some(pose))?;
         if self.with(|world| world.move_to(BodyId(id), &pose)) { Ok(()) } else { Err(no_body(id)) }
@@ -95,7 +95,7 @@ impl World {
         reach: f64,
         of: Option<Vec<u64>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        if !(reach >= 0.0) {
+        if reach.is_nan() || reach < 0.0 {
             return Err(refused(format!("expected a reach of at least 0, got {reach}")));
         }
         let world = self.with(|world| world.clone());

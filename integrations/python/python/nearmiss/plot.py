@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,9 @@ MOST = 20_000
 
 def _pyplot() -> Any:
     try:
-        import matplotlib.pyplot as pyplot
+        return import_module("matplotlib.pyplot")
     except ImportError as cause:
         raise ImportError("expected matplotlib, got none; `pip install nearmiss[plot]`") from cause
-    return pyplot
 
 
 def _placed(scan: Scan, pose: Any) -> NDArray[np.float64]:
