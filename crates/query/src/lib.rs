@@ -58,6 +58,7 @@ pub use papers::pacer::Pacer;
 pub use question::{Pair, Question, Scratch};
 pub use shape::NearestPoint;
 pub use solid::answer::{ShapeAnswer, ShapeContact, ShapeDistance, ShapeVerdict};
+pub use solid::between::ShapeGap;
 pub use solid::hint::ShapeHint;
 pub use solid::plan::ShapePlan;
 pub use solid::ray::{Ray, RayAnswer, RayHit};
