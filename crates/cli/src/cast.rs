@@ -44,16 +44,34 @@ pub struct CastArgs {
     #[arg(long, value_name = "OUT.png", requires_all = ["from", "to"], help_heading = "Depth image")]
     pub image: Option<PathBuf>,
     /// Place of the camera
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "image", help_heading = "Depth image")]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        allow_hyphen_values = true,
+        requires = "image",
+        help_heading = "Depth image"
+    )]
     pub from: Option<Place>,
     /// Place that the camera looks at
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "image", help_heading = "Depth image")]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        allow_hyphen_values = true,
+        requires = "image",
+        help_heading = "Depth image"
+    )]
     pub to: Option<Place>,
     /// Width of the view in degrees, from 1 to 170
     #[arg(long, value_name = "DEGREES", default_value_t = 75.0, value_parser = parse_angle, help_heading = "Depth image")]
     pub angle: f64,
     /// Axis that points up in the image: x, y, z, -x, -y or -z; by default z
-    #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "image", help_heading = "Depth image")]
+    #[arg(
+        long,
+        value_name = "AXIS",
+        allow_hyphen_values = true,
+        requires = "image",
+        help_heading = "Depth image"
+    )]
     pub up: Option<Up>,
     /// Print one JSON object for each ray
     #[arg(long, help_heading = "Output")]
@@ -142,7 +160,9 @@ fn draw(args: &CastArgs, target: &Target<'_>, (path, console): (&Path, Console))
     let (Some(Place(eye)), Some(Place(place))) = (args.from, args.to) else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
     let viewer = Viewer::new(&view, target, [eye, place], args.angle).ok_or_else(|| {
-        CliError::Usage("--to: expected another place than --from, got the same; the camera looks at it".into())
+        CliError::Usage(
+            "--to: expected another place than --from, got the same; the camera looks at it".into(),
+        )
     })?;
     let bar = console.spinner(format_args!("painting {}", path.display()));
     let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());

@@ -68,8 +68,9 @@ pub use nearmiss_query::{
     MeshScratch, MeshSolid, MeshVerdict, Method, Moving, NearestPoint, Order, Pacer, Pair, PairHint, Placed,
     PlacedBody, PlacedMesh, PlanError, Prepared, PreparedMesh, Proof, Question, Ray, RayAnswer, RayHit,
     Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeAnswer, ShapeContact, ShapeDistance,
-    ShapeGap, ShapeHint, ShapeIndex, ShapePlan, ShapeVerdict, Statistics, SupportMap, SurfelSize, Sweep, SweepAnswer,
-    SweepOptions, SweepPlan, SweepReason, SweepVerdict, Target, Until, Verdict, World, each,
+    ShapeGap, ShapeHint, ShapeIndex, ShapePlan, ShapeSweep, ShapeSweepVerdict, ShapeVerdict, Statistics,
+    SupportMap, SurfelSize, Sweep, SweepAnswer, SweepOptions, SweepPlan, SweepReason, SweepVerdict, Target,
+    Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

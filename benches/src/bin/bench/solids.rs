@@ -156,7 +156,10 @@ fn measure(object: &Object, arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     let spheres = draw(object, (number, radius, seed), Some(3.0)).spheres;
-    println!("\nSpheres up to 3 r off, on two threads: {:.2} times as fast.\n", speedup(&estimated, &spheres)?);
+    println!(
+        "\nSpheres up to 3 r off, on two threads: {:.2} times as fast.\n",
+        speedup(&estimated, &spheres)?
+    );
     Ok(())
 }
 

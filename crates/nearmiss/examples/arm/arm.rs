@@ -75,12 +75,18 @@ impl Arm {
         }
     }
 
-    /// The nearest pair.
-    pub(crate) fn nearest_pair(&self, room: &Target<'_>, angles: &Angles, scratch: &mut Scratch) -> Near {
-        let mut best = Near { link: 0, other: None, lower: f64::INFINITY, upper: f64::INFINITY };
+    /// The nearest pair of a link and the room, and that of two links.
+    pub(crate) fn nearest_pairs(
+        &self,
+        room: &Target<'_>,
+        angles: &Angles,
+        scratch: &mut Scratch,
+    ) -> [Near; 2] {
+        let mut best = [Near { link: 0, other: None, lower: f64::INFINITY, upper: f64::INFINITY }; 2];
         self.pairs(room, angles, scratch, |near| {
-            if near.upper < best.upper {
-                best = near;
+            let of_kind = &mut best[usize::from(near.other.is_some())];
+            if near.upper < of_kind.upper {
+                *of_kind = near;
             }
         });
         best

@@ -11,8 +11,10 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
-use arm::{Angles, Arm, between, prove};
-use nearmiss::{BuildOptions, Check, CollideOptions, PointCloud, Pose, Scan, Scratch, Shape, ShapePlan, Target};
+use arm::{Angles, Arm, Near, between, prove};
+use nearmiss::{
+    BuildOptions, Check, CollideOptions, PointCloud, Pose, Scan, Scratch, Shape, ShapePlan, Target,
+};
 use nearmiss_testdata::arbitrary::rng;
 use rand::RngExt;
 
@@ -50,7 +52,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         if path.len() > LEGS {
             break;
         }
-        let goal: Angles = std::array::from_fn(|k| rng.random_range(-1.0..1.0) * if k == 1 { 0.9 } else { PI });
+        let goal: Angles =
+            std::array::from_fn(|k| rng.random_range(-1.0..1.0) * if k == 1 { 0.9 } else { PI });
         let Some(start) = path.last() else { break };
         match prove(&arm, &target, [start, &goal], &mut scratch) {
             Ok(proof) => {
@@ -65,13 +68,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("all pairs keep more than {clearance:.2e}, proven");
 
     let mut moments = Vec::new();
+    let mut nearest: Option<[Near; 2]> = None;
     for leg in path.windows(2) {
         for step in 0..=SHOWN {
             let angles = between([&leg[0], &leg[1]], f64::from(step) / f64::from(SHOWN));
-            moments.push((arm.links(&angles), arm.nearest_pair(&target, &angles, &mut scratch)));
+            let own = arm.nearest_pairs(&target, &angles, &mut scratch);
+            moments.push((arm.links(&angles), own[0].upper));
+            let nearer =
+                |k: usize| nearest.map(|it| it[k]).filter(|it| it.upper < own[k].upper).unwrap_or(own[k]);
+            nearest = Some([nearer(0), nearer(1)]);
         }
     }
-    if let Some((_, near)) = moments.iter().min_by(|a, b| a.1.upper.total_cmp(&b.1.upper)) {
+    for near in nearest.into_iter().flatten() {
         let other = near.other.map_or("the room".into(), |other| format!("link {other}"));
         println!("nearest among the times shown: link {} and {other}, {:.4} apart", near.link, near.upper);
     }

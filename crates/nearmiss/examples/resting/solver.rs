@@ -16,10 +16,17 @@ const SLOP: f64 = 1e-3;
 /// A ball, box or capsule of mass 1.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind {
-    Ball { radius: f64 },
-    Box { half: [f64; 3] },
+    Ball {
+        radius: f64,
+    },
+    Box {
+        half: [f64; 3],
+    },
     /// Along its own x axis.
-    Capsule { half: f64, radius: f64 },
+    Capsule {
+        half: f64,
+        radius: f64,
+    },
 }
 
 impl Kind {
@@ -125,7 +132,8 @@ impl Body {
         let mut resisted = Vector::zeros();
         for _ in 0..ITERATIONS {
             let load: f64 = held.iter().map(|held| held.impulses[0]).sum();
-            let wanted = resisted - axes * (self.kind.moments().component_mul(&(axes.transpose() * self.spin)));
+            let wanted =
+                resisted - axes * (self.kind.moments().component_mul(&(axes.transpose() * self.spin)));
             let kept = wanted.cap_magnitude(self.rolling * load);
             self.spin += inverse * (kept - resisted);
             resisted = kept;

@@ -34,7 +34,8 @@ fn bodies_come_to_rest_on_a_scan() {
     for noise in [0.0, 0.03] {
         let sampling = Sampling { spacing: 0.05, noise, order: Order::Random, seed: 3 };
         let points = patch(2.0, 2.0).sample(sampling).points;
-        let scan = Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap();
+        let scan =
+            Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap();
         let margin = 0.5 * scan.sampling_radius();
         let plan = ShapePlan::new(&CollideOptions::default().with_margin(margin), &scan).unwrap();
         let target = Target::new(scan.at(&Pose::IDENTITY), &plan);
