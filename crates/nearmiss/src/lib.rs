@@ -25,6 +25,12 @@ struct MovingGuide;
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/motions.md")]
 struct MotionsGuide;
+
+/// The examples of the guide about robots compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/robots.md")]
+struct RobotsGuide;
+
 /// The examples of the guide about shapes and rays compile and run.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/shapes.md")]
