@@ -18,7 +18,7 @@ use crate::posing;
 use crate::preprocess::parse_threads;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
-use depth_picture::{Place, Viewer};
+use depth_picture::Viewer;
 
 /// Options of `cast`.
 #[derive(Debug, Clone, Args)]
@@ -51,7 +51,7 @@ pub struct CastArgs {
         requires = "image",
         help_heading = "Depth image"
     )]
-    pub from: Option<Place>,
+    pub from: Option<[f64; 3]>,
     /// Place that the camera looks at
     #[arg(
         long,
@@ -60,7 +60,7 @@ pub struct CastArgs {
         requires = "image",
         help_heading = "Depth image"
     )]
-    pub to: Option<Place>,
+    pub to: Option<[f64; 3]>,
     /// Width of the view in degrees, from 1 to 170
     #[arg(long, value_name = "DEGREES", default_value_t = 75.0, value_parser = parse_angle, help_heading = "Depth image")]
     pub angle: f64,
@@ -90,6 +90,14 @@ struct CastReport {
     normal: Option<[f64; 3]>,
     evidence: &'static str,
     micros: f64,
+}
+
+/// Parses a place in the world.
+fn parse_place(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let place = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    let place = place.filter(|place| place.iter().all(|c| c.is_finite()));
+    place.ok_or_else(|| "expected X,Y,Z in world units, such as 1.5,0,2".into())
 }
 
 /// Parses the width of a view.
@@ -157,7 +165,7 @@ fn answer(
 
 /// Draws the depth image.
 fn draw(args: &CastArgs, target: &Target<'_>, (path, console): (&Path, Console)) -> Result<(), CliError> {
-    let (Some(Place(eye)), Some(Place(place))) = (args.from, args.to) else { return Ok(()) };
+    let (Some(eye), Some(place)) = (args.from, args.to) else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
     let viewer = Viewer::new(&view, target, [eye, place], args.angle).ok_or_else(|| {
         CliError::Usage(

@@ -25,6 +25,12 @@ struct MovingGuide;
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/motions.md")]
 struct MotionsGuide;
+
+/// The examples of the guide about robots compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/robots.md")]
+struct RobotsGuide;
+
 /// The examples of the guide about shapes and rays compile and run.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/shapes.md")]
@@ -68,8 +74,9 @@ pub use nearmiss_query::{
     MeshScratch, MeshSolid, MeshVerdict, Method, Moments, Moving, NearestPoint, Order, Pacer, Pair, PairHint,
     Placed, PlacedBody, PlacedMesh, PlanError, Prepared, PreparedMesh, Proof, Question, Ray, RayAnswer,
     RayHit, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeAnswer, ShapeContact,
-    ShapeDistance, ShapeHint, ShapeIndex, ShapePlan, ShapeVerdict, Statistics, SupportMap, SurfelSize, Sweep,
-    SweepAnswer, SweepOptions, SweepPlan, SweepReason, SweepVerdict, Target, Until, Verdict, World, each,
+    ShapeDistance, ShapeGap, ShapeHint, ShapeIndex, ShapePlan, ShapeSweep, ShapeSweepVerdict, ShapeVerdict,
+    Statistics, SupportMap, SurfelSize, Sweep, SweepAnswer, SweepOptions, SweepPlan, SweepReason,
+    SweepVerdict, Target, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -8,4 +8,5 @@ pub(crate) mod impact;
 pub(crate) mod interval;
 pub(crate) mod plan;
 pub(crate) mod scans;
+pub(crate) mod solids;
 pub(crate) mod travel;

@@ -1,6 +1,7 @@
 //! Convex shapes and rays against the obstacle of a scan.
 
 pub(crate) mod answer;
+pub(crate) mod between;
 pub(crate) mod cast;
 pub(crate) mod closest;
 pub(crate) mod contacts;

@@ -1,6 +1,10 @@
 //! A placed scan as the target of convex shapes and rays.
 
+use nearmiss_geometry::Motion;
+
 use crate::ask::answer::{Evidence, Reason};
+use crate::motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepReason};
+use crate::motion::solids::sweep;
 use crate::pair::placed::Placed;
 use crate::pair::placed_balls::is_proper;
 use crate::question::Scratch;
@@ -175,6 +179,48 @@ impl<'a> Target<'a> {
                 out.push(hit);
             }
         }
+    }
+
+    /// Decides whether a shape keeps the margin of the plan from the scan during a whole motion, and
+    /// finds the first impact otherwise. The poses of `motion` map the frame in which `shape` is given to
+    /// the world.
+    ///
+    /// `Free` and `t_free` are proofs, as for two scans ([`Sweep`](crate::Sweep)); plans without
+    /// certificates prove nothing. Contacts are looked for a quarter of a local radius of travel apart
+    /// where nothing is proven. Hulls and shapes of the caller's own do not move: move the scan instead.
+    ///
+    /// Costs a few distance queries, more the longer the shape moves within about one local radius of
+    /// the scan.
+    ///
+    /// ```
+    /// use nearmiss_geometry::{Motion, PointCloud, Pose};
+    /// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+    /// use nearmiss_query::{CollideOptions, Prepared, Scratch, Shape, ShapePlan, ShapeSweepVerdict, Target};
+    ///
+    /// let points: Vec<[f32; 3]> =
+    ///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+    /// let floor = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+    /// let plan = ShapePlan::new(&CollideOptions::default(), &floor)?;
+    /// let target = Target::new(floor.at(&Pose::IDENTITY), &plan);
+    ///
+    /// // A ball of radius 0.1 is lowered from 1 above the floor to 1 below it.
+    /// let ball = Shape::Sphere { centre: [0.0; 3], radius: 0.1 };
+    /// let at = |z: f64| Pose::from_translation([0.5, 0.5, z]);
+    /// let lowered = Motion::through(&[at(1.0), at(-1.0)])?;
+    /// let answer = target.sweep(&ball, &lowered, &mut Scratch::default());
+    /// let ShapeSweepVerdict::Impact { t_free, t_hit, .. } = answer.verdict else { panic!("they meet") };
+    /// assert!(t_free <= t_hit && (t_hit - 0.45).abs() < 0.005 && t_hit - t_free < 0.02);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn sweep(&self, shape: &Shape<'_>, motion: &Motion, scratch: &mut Scratch) -> ShapeSweep {
+        if !self.is_proper {
+            let verdict = ShapeSweepVerdict::Undecided { t_free: 0.0, reason: SweepReason::Pose };
+            return ShapeSweep { verdict, distances: 0 };
+        }
+        let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
+        let working = (level, &mut contact.gathers[0], &mut solid.candidates, &mut solid.contacts);
+        sweep(&self.elements, shape, motion, working)
     }
 
     fn solid<'s>(&'s self, shape: &Shape<'s>) -> Option<Solid<'s>> {

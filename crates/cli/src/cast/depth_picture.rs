@@ -1,7 +1,6 @@
 //! A depth image of a scan: one ray for each pixel, coloured by the length of the ray.
 
 use std::ops::ControlFlow;
-use std::str::FromStr;
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{BatchScratch, Ray, RayHit, Target, each};
@@ -28,21 +27,6 @@ const GRAZING: f64 = 0.45;
 
 /// Share of the rays that may be shorter, or longer, than the range of colours.
 const OUTLYING: f64 = 0.01;
-
-/// A place in the world, as it is given on the command line.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place(pub [f64; 3]);
-
-impl FromStr for Place {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Vec<f64> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
-        let place: Option<[f64; 3]> = numbers.try_into().ok();
-        let place = place.filter(|p| p.iter().all(|c| c.is_finite()) && text.matches(',').count() == 2);
-        place.map(Self).ok_or_else(|| "expected X,Y,Z in world units, such as 1.5,0,2".into())
-    }
-}
 
 /// A camera with one vanishing point.
 #[derive(Debug, Clone, Copy)]

@@ -68,3 +68,33 @@ fn what_is_no_ray_is_refused_with_its_line() {
     place.refused(1, &["cast", "ball.xyz", "--rays", "rays.jsonl"], &["expected rays, got none", "origin"]);
     place.refused(2, &["cast", "ball.xyz"], &["--rays"]);
 }
+
+#[test]
+fn a_depth_image_shows_the_ball_in_its_middle() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    let asked =
+        ["cast", "ball.xyz", "--image", "depth.png", "--from=4,0,0", "--to", "0,0,0", "--angle", "90"];
+    place.ok(&asked);
+    let file = std::io::BufReader::new(std::fs::File::open(place.path("depth.png")).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    let width = info.width as usize;
+    // The image is 1080 by 720 pixels, with a frame of 12.
+    let at = |x: usize, y: usize| &pixels[3 * ((y + 12) * width + x + 12)..][..3];
+    assert_eq!(width, 1080 + 24, "with its frame");
+    assert_eq!(at(20, 20), [228, 230, 234], "beside the ball nothing is hit");
+    // Its nearest place is yellow, its rim at asin 1/4 from the middle, 139 pixels, is violet.
+    let [middle, rim] = [at(540, 360), at(540, 360 - 130)];
+    assert!(middle[0] > 200 && middle[2] < 120, "{middle:?}");
+    assert!(rim[2] > rim[1], "{rim:?}");
+    assert_eq!(at(540, 360 - 150), [228, 230, 234], "above the ball");
+    for (wrong, words) in [
+        (["--from=4,0", "--to=0,0,0"], ["X,Y,Z", "--from"]),
+        (["--from=1,0,0", "--to=1,0,0"], ["--to", "another place"]),
+    ] {
+        place.refused(2, &["cast", "ball.xyz", "--image", "depth.png", wrong[0], wrong[1]], &words);
+    }
+    place.refused(2, &["cast", "ball.xyz", "--image", "depth.png"], &["--from"]);
+}

@@ -1,5 +1,5 @@
 //! A small solver of rigid bodies on a scan: semi-implicit Euler, sequential impulses with friction
-//! (Catto, "Iterative dynamics with temporal coherence", GDC 2005). No damping, no sleeping.
+//! (Catto 2005). No damping, no sleeping.
 
 use nearmiss::geometry::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use nearmiss::{Pose, Scratch, Shape, ShapeContact, ShapeHint, Target};

@@ -336,6 +336,29 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
         pairs.dedup();
     }
 
+    /// The broad phase with a reach of its own for each pair: writes the pairs whose bounding boxes come
+    /// within `reach_of` each other to `pairs`, as [`Self::near_pairs`] does. `None` leaves a pair out,
+    /// such as two neighbouring links of a robot. No reach may exceed `most`.
+    ///
+    /// `reach_of` is called in ascending order, once for each pair within `most`. Groups of bodies are a
+    /// map of the caller's from ids to groups, which `reach_of` asks.
+    pub fn near_pairs_by(
+        &self,
+        bodies: Bodies<'_>,
+        most: f64,
+        mut reach_of: impl FnMut(BodyId, BodyId) -> Option<f64>,
+        pairs: &mut Vec<[BodyId; 2]>,
+    ) {
+        self.near_pairs(bodies, most, pairs);
+        let bounds = |id: BodyId| self.bounds(id).map(|bounds| Leaf::new(id, &bounds).bounds);
+        pairs.retain(|&[a, b]| {
+            reach_of(a, b).is_some_and(|reach| match (bounds(a), bounds(b)) {
+                (Some(of_a), Some(of_b)) => are_near(&of_a, &of_b, widened(reach)),
+                _ => true,
+            })
+        });
+    }
+
     /// Writes the bodies whose bounding boxes come within `reach` of `scan` to `ids`, in ascending
     /// order. `scan` need not be a body of this world.
     pub fn near(&self, scan: &Placed<'_>, reach: f64, ids: &mut Vec<BodyId>) {

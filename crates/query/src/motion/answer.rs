@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ask::answer::{Contact, Evidence, Statistics};
+use crate::solid::answer::ShapeContact;
 
 /// The verdict on a whole motion. Times are those of the [`Motion`](nearmiss_geometry::Motion).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -63,8 +64,50 @@ pub enum SweepReason {
     Budget,
     /// A pose is invalid; see [`Reason::Pose`](crate::Reason).
     Pose,
+    /// The shape is invalid, or a hull or a shape of the caller's own, which do not move.
+    Shape,
     /// The metric is geodesic. Its surfaces have no enclosures, so nothing is proven.
     Geodesic,
+}
+
+/// The verdict on the whole motion of a shape past a scan; as [`SweepVerdict`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum ShapeSweepVerdict {
+    /// Proven: during the whole motion the shape is further from the scan than the margin of the plan.
+    Free {
+        /// A proven lower bound of the distance during the whole motion, in world units.
+        clearance: f64,
+        /// An upper bound of the least distance: that at time `at`.
+        upper: f64,
+        /// The time of the least distance that was measured.
+        at: f64,
+    },
+    /// The shape touches the scan, or comes within the margin.
+    Impact {
+        /// The motion is proven free from its start to this time. 0 if nothing is proven.
+        t_free: f64,
+        /// The first time at which a contact was found.
+        t_hit: f64,
+        /// The deepest contact at time `t_hit`. `None` if the shape touches nothing but the rim of a
+        /// disc, from beside.
+        contact: Option<ShapeContact>,
+    },
+    /// The motion is proven free up to `t_free`. No contact was found after it, but no proof either.
+    Undecided {
+        /// The motion is proven free from its start to this time.
+        t_free: f64,
+        /// The reason why the proof ends there.
+        reason: SweepReason,
+    },
+}
+
+/// The answer of the sweep of a shape.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ShapeSweep {
+    /// The verdict.
+    pub verdict: ShapeSweepVerdict,
+    /// The number of distance queries.
+    pub distances: u32,
 }
 
 /// The answer of a sweep and its cost.

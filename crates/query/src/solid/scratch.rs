@@ -1,5 +1,6 @@
 //! Reusable memory of questions about shapes and rays.
 
+use crate::solid::answer::ShapeContact;
 use crate::solid::cast::Crossing;
 use crate::solid::contacts::Candidate;
 
@@ -8,4 +9,5 @@ use crate::solid::contacts::Candidate;
 pub(crate) struct SolidScratch {
     pub(crate) candidates: Vec<Candidate>,
     pub(crate) crossings: Vec<Crossing>,
+    pub(crate) contacts: Vec<ShapeContact>,
 }

@@ -104,6 +104,36 @@ pub enum Shape<'a> {
 }
 
 impl Shape<'_> {
+    /// Returns the shape moved by a pose, as a link of a robot is; lengths follow its scale. `None` for a
+    /// hull or a shape of the caller's own, which borrow their places.
+    #[must_use]
+    pub fn moved(&self, by: &Pose) -> Option<Shape<'static>> {
+        let scale = by.scale();
+        Some(match *self {
+            Self::Sphere { centre, radius } => {
+                Shape::Sphere { centre: by.apply(centre), radius: radius * scale }
+            }
+            Self::Capsule { ends, radius } => {
+                Shape::Capsule { ends: ends.map(|end| by.apply(end)), radius: radius * scale }
+            }
+            Self::Box { pose, half, radius } => {
+                Shape::Box { pose: by.after(&pose), half, radius: radius * scale }
+            }
+            Self::Cylinder { pose, half_height, radius, rounding } => {
+                let pose = by.after(&pose);
+                Shape::Cylinder { pose, half_height, radius, rounding: rounding * scale }
+            }
+            Self::Cone { pose, half_height, radius, rounding } => {
+                let pose = by.after(&pose);
+                Shape::Cone { pose, half_height, radius, rounding: rounding * scale }
+            }
+            Self::Triangle { points, radius } => {
+                Shape::Triangle { points: points.map(|p| by.apply(p)), radius: radius * scale }
+            }
+            Self::Hull { .. } | Self::Own { .. } => return None,
+        })
+    }
+
     /// Returns the radius about the core, in world units.
     #[must_use]
     pub fn rounding(&self) -> f64 {

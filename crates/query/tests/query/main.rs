@@ -24,6 +24,7 @@ mod penetration;
 mod rays;
 mod shapes;
 mod solid_contacts;
+mod solid_sweeps;
 mod solids;
 mod sparse;
 mod sweeps;

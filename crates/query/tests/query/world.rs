@@ -372,3 +372,25 @@ fn bodies_left_out_for_a_shape_do_not_touch_it() {
     world.near_shape(&nothing, 0.0, &mut ids);
     assert_eq!(ids.len(), placed.len(), "what is nowhere is left to the narrow phase");
 }
+
+#[test]
+fn each_pair_has_its_own_reach() {
+    let (world, placed) = crowd(60);
+    // Bodies of one group are no pair; the others have a margin by their ids.
+    let reach_of = |a: BodyId, b: BodyId| (a.0 % 3 != b.0 % 3).then(|| 0.4 * ((a.0 + b.0) % 5) as f64);
+    let (mut pairs, mut expected, mut near) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, (a, ..)) in placed.iter().enumerate() {
+        for (b, ..) in &placed[i + 1..] {
+            let pair = [*a.min(b), *a.max(b)];
+            let Some(reach) = reach_of(pair[0], pair[1]) else { continue };
+            world.near_pairs(Bodies::These(&[pair[0]]), reach, &mut near);
+            if near.contains(&pair) {
+                expected.push(pair);
+            }
+        }
+    }
+    expected.sort_unstable();
+    world.near_pairs_by(Bodies::All, 1.6, reach_of, &mut pairs);
+    assert_eq!(pairs, expected, "the same pairs as one by one");
+    assert!(pairs.len() > 10, "{} pairs", pairs.len());
+}

@@ -1,0 +1,127 @@
+//! A six-link arm of capsules in a scanned room: finds a path of its joints that is proven free of the
+//! room and of the arm itself, and draws it with the clearance as colour.
+//!
+//! `cargo run --release -p nearmiss --example arm [SCAN [OUT.svg [X,Y,Z]]]`, z up; the arm stands at X,Y,Z
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+mod arm;
+mod drawing;
+
+use std::error::Error;
+use std::f64::consts::PI;
+use std::path::PathBuf;
+
+use arm::{Angles, Arm, Near, between, prove};
+use nearmiss::{
+    BuildOptions, Check, CollideOptions, PointCloud, Pose, Scan, Scratch, Shape, ShapePlan, Target,
+};
+use nearmiss_testdata::arbitrary::rng;
+use rand::RngExt;
+
+/// Legs of the path, and tries to find each.
+const LEGS: usize = 5;
+const TRIES: u32 = 400;
+
+/// Times of each leg that are drawn.
+const SHOWN: u32 = 12;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut words = std::env::args_os().skip(1);
+    let scan = match words.next().map(PathBuf::from) {
+        Some(path) if path.extension().is_some_and(|end| end == "nm") => Scan::open(&path, Check::Structure)?,
+        Some(path) => Scan::build(&nearmiss::io::read(&path, None)?.cloud, &BuildOptions::default())?,
+        None => Scan::build(&PointCloud::from_positions(&room())?, &BuildOptions::default())?,
+    };
+    let picture = words.next().map_or_else(|| PathBuf::from("arm.svg"), PathBuf::from);
+    let place = words.next().and_then(|word| word.to_str().map(numbers)).unwrap_or_default();
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
+    let target = Target::new(scan.at(&Pose::IDENTITY), &plan);
+    let mut scratch = Scratch::default();
+
+    let base = <[f64; 3]>::try_from(place).unwrap_or_else(|_| scan.bounds().centre());
+    let dot = Shape::Sphere { centre: base, radius: 0.0 };
+    let room_for = target.distance(&dot, f64::INFINITY, &mut scratch).map_or(1.0, |found| found.upper);
+    // Longer than the room around its base, so that the path must go about things.
+    let arm = Arm { base, length: 1.6 * room_for };
+    println!("an arm {:.3} long at {base:.3?}, among {} points", arm.length, scan.len());
+
+    let mut rng = rng(5);
+    let mut path: Vec<Angles> = vec![[0.0, -1.2, 2.0, 0.0, 1.0, 0.0]];
+    let (mut refused, mut intervals, mut clearance) = (0, 0, f64::INFINITY);
+    for _ in 0..TRIES {
+        if path.len() > LEGS {
+            break;
+        }
+        let goal: Angles =
+            std::array::from_fn(|k| rng.random_range(-1.0..1.0) * if k == 1 { 0.9 } else { PI });
+        let Some(start) = path.last() else { break };
+        match prove(&arm, &target, [start, &goal], &mut scratch) {
+            Ok(proof) => {
+                intervals += proof.intervals;
+                clearance = clearance.min(proof.clearance);
+                path.push(goal);
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    println!("{} legs proven free, {refused} refused; {intervals} intervals in the proof", path.len() - 1);
+    println!("all pairs keep more than {clearance:.2e}, proven");
+
+    let mut moments = Vec::new();
+    let mut nearest: Option<[Near; 2]> = None;
+    for leg in path.windows(2) {
+        for step in 0..=SHOWN {
+            let angles = between([&leg[0], &leg[1]], f64::from(step) / f64::from(SHOWN));
+            let own = arm.nearest_pairs(&target, &angles, &mut scratch);
+            moments.push((arm.links(&angles), own[0].upper));
+            let nearer =
+                |k: usize| nearest.map(|it| it[k]).filter(|it| it.upper < own[k].upper).unwrap_or(own[k]);
+            nearest = Some([nearer(0), nearer(1)]);
+        }
+    }
+    for near in nearest.into_iter().flatten() {
+        let other = near.other.map_or("the room".into(), |other| format!("link {other}"));
+        println!("nearest among the times shown: link {} and {other}, {:.4} apart", near.link, near.upper);
+    }
+    std::fs::write(&picture, drawing::svg(&scan, &arm, &moments)?)?;
+    println!("drawn in {}", picture.display());
+    Ok(())
+}
+
+fn numbers(text: &str) -> Vec<f64> {
+    text.split(',').filter_map(|word| word.trim().parse().ok()).collect()
+}
+
+/// Points of a room, 4 by 3 by 2.5, with a table and a post.
+fn room() -> Vec<[f64; 3]> {
+    const STEP: f64 = 0.04;
+    let mut points = Vec::new();
+    let mut plate = |corner: [f64; 3], along: [usize; 2], size: [u32; 2]| {
+        for i in 0..=size[0] {
+            for j in 0..=size[1] {
+                let mut p = corner;
+                p[along[0]] += f64::from(i) * STEP;
+                p[along[1]] += f64::from(j) * STEP;
+                points.push(p);
+            }
+        }
+    };
+    for z in [0.0, 2.52] {
+        plate([-2.0, -1.5, z], [0, 1], [100, 75]);
+    }
+    for (corner, along, size) in [
+        ([-2.0, -1.5, 0.02], [0, 2], [100, 62]),
+        ([-2.0, 1.5, 0.02], [0, 2], [100, 62]),
+        ([-2.0, -1.48, 0.02], [1, 2], [74, 62]),
+        ([2.0, -1.48, 0.02], [1, 2], [74, 62]),
+        // The table and the post.
+        ([0.7, -0.5, 0.8], [0, 1], [15, 25]),
+        ([-0.9, 0.7, 0.02], [0, 2], [4, 62]),
+        ([-0.9, 0.86, 0.02], [0, 2], [4, 62]),
+        ([-0.9, 0.72, 0.02], [1, 2], [3, 62]),
+        ([-0.74, 0.72, 0.02], [1, 2], [3, 62]),
+    ] {
+        plate(corner, along, size);
+    }
+    points
+}

@@ -1,0 +1,174 @@
+//! A convex shape that moves past a scan: conservative advancement (Mirtich 1996, chapter 2) on proven
+//! distances, and tests a quarter of a spacing apart where nothing is proven.
+
+use fearless_simd::Level;
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{Aabb, Motion, Screw};
+
+use crate::motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepReason};
+use crate::pair::placed::ViewScratch;
+use crate::solid::answer::{ShapeContact, ShapeDistance};
+use crate::solid::contacts::{Candidate, contacts};
+use crate::solid::core::Solid;
+use crate::solid::distance::distance;
+use crate::solid::elements::Elements;
+use crate::solid::shape::Shape;
+
+type Vector = Vector3<f64>;
+
+/// The share of the way that is proven free which a step takes. Less would take more steps; with all of
+/// it, no distance would be left at the end.
+const STEP: f64 = 0.8;
+
+/// If less than this is left of the distance, in local radii, steps are no longer proven.
+const LEFT: f64 = 0.1;
+
+/// The way between two tests where nothing is proven, in local radii.
+const TEST: f64 = 0.25;
+
+/// Halvings of the last interval before a contact.
+const HALVINGS: u32 = 10;
+
+/// Distance queries after which the search for a contact ends.
+const MOST: u32 = 100_000;
+
+/// More than the rounding of a pose along a motion and of a speed.
+const ROUNDING: f64 = 1e-9;
+
+/// The memory of a sweep.
+pub(crate) type Working<'a> = (Level, &'a mut ViewScratch, &'a mut Vec<Candidate>, &'a mut Vec<ShapeContact>);
+
+/// A shape along its motion.
+struct Course<'s, 'a> {
+    elements: &'s Elements<'a>,
+    shape: &'s Shape<'s>,
+    motion: &'s Motion,
+    /// The centre of a ball about the shape in its own frame, and its radius.
+    ball: (Vector, f64),
+    /// The clearance in the world.
+    clearance: f64,
+    level: Level,
+    distances: u32,
+}
+
+/// Decides whether a shape keeps the margin of the plan along a motion.
+pub(crate) fn sweep(
+    elements: &Elements<'_>,
+    shape: &Shape<'_>,
+    motion: &Motion,
+    (level, scratch, candidates, found): Working<'_>,
+) -> ShapeSweep {
+    let clearance = elements.margin * elements.scale();
+    let undecided = |reason| ShapeSweepVerdict::Undecided { t_free: 0.0, reason };
+    let Some(Aabb { min, max }) = shape.bounds() else {
+        return ShapeSweep { verdict: undecided(SweepReason::Shape), distances: 0 };
+    };
+    let (min, max) = (Vector::from(min), Vector::from(max));
+    let ball = (0.5 * (min + max), 0.5 * (max - min).norm());
+    let mut course = Course { elements, shape, motion, ball, clearance, level, distances: 0 };
+    let verdict = match course.run() {
+        Err(reason) => undecided(reason),
+        Ok(Outcome::Told(verdict)) => verdict,
+        Ok(Outcome::Hit { t_free, apart, t_hit }) => {
+            let t_hit = course.first_touch(apart, t_hit);
+            let moved = shape.moved(&motion.at(t_hit));
+            let solid = moved.as_ref().and_then(|it| Solid::new(it, elements.placed.stored_to_world()));
+            contacts(elements, solid.as_ref(), None, found, (level, scratch, candidates));
+            ShapeSweepVerdict::Impact { t_free, t_hit, contact: found.first().copied() }
+        }
+    };
+    ShapeSweep { verdict, distances: course.distances }
+}
+
+/// The outcome of an advancement.
+enum Outcome {
+    Told(ShapeSweepVerdict),
+    /// They touch at `t_hit`, but not at `apart`.
+    Hit {
+        t_free: f64,
+        apart: f64,
+        t_hit: f64,
+    },
+}
+
+impl Course<'_, '_> {
+    /// Bounds the distance at a time.
+    fn at(&mut self, time: f64) -> Result<ShapeDistance, SweepReason> {
+        let moved = self.shape.moved(&self.motion.at(time)).ok_or(SweepReason::Shape)?;
+        let solid = Solid::new(&moved, self.elements.placed.stored_to_world()).ok_or(SweepReason::Shape)?;
+        self.distances += 1;
+        // Without any disc or ball, nothing is known.
+        distance(self.elements, Some(&solid), f64::INFINITY, self.level).ok_or(SweepReason::Near)
+    }
+
+    /// A bound on the speed of any point of the shape: along a screw each has a constant speed.
+    fn speed(&self, screw: &Screw) -> f64 {
+        let start = screw.start();
+        let centre = start.apply(self.ball.0.into());
+        let turn = Vector::from(screw.turn()).norm();
+        (Vector::from(screw.velocity(centre)).norm() + turn * self.ball.1 * start.scale()) * (1.0 + ROUNDING)
+    }
+
+    fn run(&mut self) -> Result<Outcome, SweepReason> {
+        let duration = self.motion.duration();
+        let (mut time, mut apart) = (0.0, 0.0);
+        // The time up to which the motion is proven free, and `true` while the proof goes on.
+        let (mut proven, mut goes_on) = (0.0_f64, true);
+        let (mut least, mut at, mut kept) = (f64::INFINITY, 0.0, f64::INFINITY);
+        // The lower bound before, and the way since.
+        let mut last: Option<(f64, f64)> = None;
+        let mut reason = SweepReason::Near;
+        loop {
+            let found = self.at(time)?;
+            let left = found.lower * (1.0 - ROUNDING) - self.clearance;
+            if found.upper <= self.clearance {
+                return Ok(Outcome::Hit { t_free: proven.min(time), apart, t_hit: time });
+            }
+            if found.upper < least {
+                (least, at) = (found.upper, time);
+            }
+            kept = kept.min(last.map_or(found.lower, |(lower, way)| 0.5 * (lower + found.lower - way)));
+            // Each leg takes one unit of time.
+            let end = (time.floor() + 1.0).min(duration);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a leg")]
+            let speed = self.speed(&self.motion.screw(time as usize));
+            if goes_on && left > 0.0 {
+                proven = proven.max((time + left / speed).min(end));
+            }
+            if time >= duration {
+                goes_on &= left > 0.0 || last.is_some() && proven >= duration;
+                break;
+            }
+            let is_near = left <= LEFT * found.band;
+            let way = if is_near { TEST * found.band } else { STEP * left };
+            let next = time + way / speed;
+            // What is left of the proof may reach the end of the motion.
+            goes_on &= proven >= duration || !is_near && (next > time || speed == 0.0);
+            if self.distances >= MOST {
+                (reason, goes_on) = (SweepReason::Budget, false);
+                break;
+            }
+            apart = time;
+            time = if next > time && next < end { next } else { end };
+            last = Some((found.lower, speed * (time - apart)));
+        }
+        Ok(Outcome::Told(if goes_on {
+            ShapeSweepVerdict::Free { clearance: kept.max(self.clearance), upper: least, at }
+        } else {
+            ShapeSweepVerdict::Undecided { t_free: proven, reason }
+        }))
+    }
+
+    /// The first time between two at which a contact is found, by halving.
+    fn first_touch(&mut self, mut apart: f64, mut hit: f64) -> f64 {
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (apart + hit);
+            if self.at(middle).is_ok_and(|found| found.upper <= self.clearance) {
+                hit = middle;
+            } else {
+                apart = middle;
+            }
+        }
+        hit
+    }
+}

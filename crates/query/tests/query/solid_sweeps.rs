@@ -1,0 +1,169 @@
+//! Shapes that move past scans, against brute force over time; distances of two shapes.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{Motion, PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_query::{
+    CollideOptions, Placed, Scratch, Shape, ShapePlan, ShapeSweepVerdict, SweepReason, Target,
+};
+use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
+use nearmiss_testdata::shapes::{self, Order, Sampling};
+use rand::RngExt;
+
+type Vector = Vector3<f64>;
+
+/// Shapes of about this size in their own frame.
+fn shapes_of(size: f64) -> [Shape<'static>; 5] {
+    let up = Pose::from_translation([0.2 * size, 0.0, 0.0]);
+    [
+        Shape::Sphere { centre: [0.3 * size, 0.0, 0.0], radius: size },
+        Shape::Capsule { ends: [[-size, 0.0, 0.0], [size, 0.0, 0.0]], radius: 0.4 * size },
+        Shape::Box { pose: up, half: [size, 0.6 * size, 0.3 * size], radius: 0.0 },
+        Shape::Cylinder { pose: up, half_height: size, radius: 0.5 * size, rounding: 0.0 },
+        Shape::Triangle { points: [[size, 0.0, 0.0], [0.0, size, 0.0], [-size, -size, 0.1]], radius: 0.1 },
+    ]
+}
+
+#[test]
+fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
+    let sampled = shapes::torus(1.0, 0.4).sample(Sampling {
+        spacing: 0.05,
+        noise: 0.03,
+        order: Order::Random,
+        seed: 2,
+    });
+    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
+    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let r = scan.sampling_radius();
+    let rng = &mut rng(11);
+    let mut scratch = Scratch::default();
+    let (mut seen, mut clear, mut proven, mut queries, mut late, mut told) = ([0; 3], 0, 0, 0, 0, 0);
+    for round in 0..120_usize {
+        let margin = [0.0, 0.1][round % 2];
+        let plan = ShapePlan::new(&CollideOptions::default().with_margin(margin), &scan).unwrap();
+        let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+        let shape = shapes_of(0.15)[round % 5];
+        let poses: Vec<Pose> = (0..3)
+            .map(|_| rotation(rng).with_translation(unit_vector(rng).map(|x| x * rng.random_range(0.6..2.4))))
+            .collect();
+        let motion = Motion::through(&poses).unwrap();
+        let answer = target.sweep(&shape, &motion, &mut scratch);
+        queries += answer.distances;
+        // Brute force.
+        let steps = 1000_u32;
+        let at = |step: u32| f64::from(step) / f64::from(steps) * motion.duration();
+        let mut upper = |time: f64| {
+            let moved = shape.moved(&motion.at(time)).unwrap();
+            target.distance(&moved, f64::INFINITY, &mut scratch).unwrap().upper
+        };
+        let distances: Vec<f64> = (0..=steps).map(|step| upper(at(step))).collect();
+        let first = distances.iter().position(|&d| d <= margin);
+        let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
+        let way = |t: f64| {
+            let [p, q] = [t, t + 1e-6].map(|t| motion.at(t));
+            let ball = 0.4 * 0.15;
+            (Vector::from(p.apply([ball; 3])) - Vector::from(q.apply([ball; 3]))).norm() / 1e-6
+        };
+        clear += usize::from(least > margin + 6.0 * r);
+        match answer.verdict {
+            ShapeSweepVerdict::Free { clearance, upper, .. } => {
+                assert!(first.is_none(), "{shape:?} is free, but touches at {first:?}");
+                assert!(clearance >= margin && clearance <= least + 1e-9, "{clearance} kept, {least} found");
+                assert!(upper >= clearance && upper >= least - 0.05, "{upper} for {least}");
+                proven += usize::from(least > margin + 6.0 * r);
+                seen[0] += 1;
+            }
+            ShapeSweepVerdict::Impact { t_free, t_hit, contact } => {
+                let first = first.map(|step| at(u32::try_from(step).unwrap()));
+                assert!(first.is_none_or(|first| first >= t_free), "touches at {first:?}, free to {t_free}");
+                assert!(upper(t_hit) <= margin && t_free <= t_hit, "no contact at {t_hit}");
+                // A hit between two of the times of brute force may be missed by it.
+                let error = first.map_or(0.0, |first| (t_hit - first) * way(t_hit));
+                assert!(error < r, "impact at {t_hit} instead of {first:?}");
+                told += usize::from(contact.is_some());
+                late += usize::from((t_hit - t_free) * way(t_hit) > 2.0 * r);
+                seen[1] += 1;
+            }
+            ShapeSweepVerdict::Undecided { t_free, reason } => {
+                assert_eq!(reason, SweepReason::Near, "{shape:?}");
+                let first = first.map(|step| at(u32::try_from(step).unwrap()));
+                assert!(first.is_none(), "touches at {first:?}, undecided from {t_free}");
+                seen[2] += 1;
+            }
+        }
+    }
+    assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}");
+    assert!(proven * 100 >= clear * 95, "{proven} of {clear} motions that stay clear are proven");
+    assert!(told * 10 >= seen[1] * 9, "{told} contacts of {} impacts", seen[1]);
+    // Only where a shape slides beside the scan first.
+    assert!(late * 4 <= seen[1], "{late} of {} impacts long after the end of the proof", seen[1]);
+    assert!(queries < 120 * 40, "{queries} distance queries");
+}
+
+#[test]
+fn shapes_that_do_not_move_or_start_in_contact_are_told() {
+    let sampled =
+        shapes::patch(2.0, 2.0).sample(Sampling { spacing: 0.05, noise: 0.0, order: Order::Random, seed: 2 });
+    let scan = PointHierarchy::build(
+        &PointCloud::from_positions(&sampled.points).unwrap(),
+        &BuildOptions::default(),
+    )
+    .unwrap();
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+    let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+    let mut scratch = Scratch::default();
+    let ball = Shape::Sphere { centre: [0.0; 3], radius: 0.1 };
+    let still = |z: f64| Motion::still(Pose::from_translation([0.0, 0.0, z]));
+    let mut told = |shape: &Shape<'_>, motion: &Motion| target.sweep(shape, motion, &mut scratch).verdict;
+    assert!(matches!(told(&ball, &still(0.5)), ShapeSweepVerdict::Free { .. }), "above the floor");
+    let ShapeSweepVerdict::Impact { t_free, t_hit, .. } = told(&ball, &still(0.05)) else {
+        panic!("in the floor");
+    };
+    assert_eq!((t_free, t_hit), (0.0, 0.0), "in contact from the start");
+    let hull = Shape::Hull { points: &[[0.0; 3]], radius: 0.1 };
+    let wrong = Shape::Sphere { centre: [0.0; 3], radius: -1.0 };
+    for shape in [hull, wrong] {
+        let verdict = told(&shape, &still(0.5));
+        let reason = SweepReason::Shape;
+        assert_eq!(verdict, ShapeSweepVerdict::Undecided { t_free: 0.0, reason }, "{shape:?}");
+    }
+    // Close by for a long way: never a hit, and no proof either.
+    let at = |x: f64| Pose::from_translation([x, 0.0, 0.105]);
+    let along = Motion::through(&[at(-0.9), at(0.9)]).unwrap();
+    let verdict = told(&ball, &along);
+    assert!(!matches!(verdict, ShapeSweepVerdict::Impact { .. }), "{verdict:?}");
+}
+
+#[test]
+fn distances_of_two_shapes_equal_those_of_their_points() {
+    let rng = &mut rng(3);
+    for round in 0..200_usize {
+        let own = [0, 1].map(|k| {
+            let by =
+                rotation(rng).with_translation(point_in(rng, 2.0)).with_scale(rng.random_range(0.5..2.0));
+            shapes_of(0.5)[(round + k * (round / 5)) % 5].moved(&by).unwrap()
+        });
+        let gap = own[0].gap_to(&own[1]).unwrap();
+        let back = own[1].gap_to(&own[0]).unwrap();
+        assert!((gap.upper - back.upper).abs() < 1e-6, "{gap:?}, {back:?}");
+        assert!(gap.lower <= gap.upper && gap.upper - gap.lower < 1e-6, "{gap:?}");
+        let apart = (Vector::from(gap.points[0]) - Vector::from(gap.points[1])).norm();
+        assert!((apart - gap.upper).abs() < 1e-6, "{gap:?}: points are {apart} apart");
+        // Of two spheres about points of the cores, in closed form.
+        if let [Shape::Capsule { ends: p, radius: a }, Shape::Capsule { ends: q, radius: b }] = own {
+            let brute = (0..=100_u32)
+                .flat_map(|i| (0..=100_u32).map(move |j| [i, j]))
+                .map(|[i, j]| {
+                    let on = |ends: [[f64; 3]; 2], share: u32| {
+                        let [from, to] = ends.map(Vector::from);
+                        from + (to - from) * (f64::from(share) * 0.01)
+                    };
+                    ((on(p, i) - on(q, j)).norm() - a - b).max(0.0)
+                })
+                .fold(f64::INFINITY, f64::min);
+            assert!(gap.upper <= brute + 1e-9 && brute <= gap.upper + 0.02, "{gap:?} for {brute}");
+        }
+    }
+    let wrong = Shape::Sphere { centre: [f64::NAN; 3], radius: 1.0 };
+    assert!(wrong.gap_to(&shapes_of(1.0)[0]).is_none(), "invalid shapes have no distance");
+}
