@@ -4,11 +4,9 @@
 use nearmiss_geometry::{Aabb, CloudError, Dropped, Frame};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{both, change_each, fill};
-use nearmiss_store::Workspace;
+use nearmiss_lanes::parallel::{both, change_each, fill, ranges};
 use nearmiss_surface::SurfacePlan;
 
-use crate::patch::classes::dense_first;
 use crate::patch::pixels::{find_borders, fit, vote};
 use crate::patch::surfels::Fit;
 use crate::point::disc::PointCode;
@@ -98,7 +96,7 @@ pub(crate) fn replace_organised(
     find_borders(raster, fits, codes);
     fill(radii, |i| raster.radius(along[i]));
     let topology = Topology::new(id32(count), options.leaf_size);
-    let dense = order(raster, fits, along, items, options)?;
+    let dense = order(raster, fits, along, items, options.leaf_size as usize);
     split_loose(items, &topology, dense, &|leaf: &[Item]| is_loose(leaf, radii));
 
     resize(scan, topology);
@@ -168,23 +166,26 @@ fn is_in_range(bounds: &Aabb) -> bool {
 }
 
 /// Puts the points into `items` along the curve, the sparse ones last. Returns the number of the
-/// others, which fill whole leaves. The index of an item is its place along the curve.
-fn order(
-    raster: &Raster,
-    fits: &[Fit],
-    along: &[Pixel],
-    items: &mut Vec<Item>,
-    options: &BuildOptions,
-) -> Result<usize, DeformError> {
-    let item = |i: usize| Item { position: raster.position(along[i]), index: id32(i) };
+/// others, which fill whole leaves: a remainder of them is moved to the sparse ones. The index of an
+/// item is its place along the curve.
+fn order(raster: &Raster, fits: &[Fit], along: &[Pixel], items: &mut Vec<Item>, leaf_size: usize) -> usize {
     items.resize(along.len(), Item { position: [0.0; 3], index: 0 });
-    fill(items, item);
-    let known = (|i: usize| items[i].position, |i: usize| fits[raster.number(along[i])].kind());
-    let (count, leaf_size, work) = (along.len(), options.leaf_size as usize, Workspace::in_memory());
-    let sorted = dense_first(count, known, leaf_size, &work).map_err(BuildError::from)?;
-    let Some((sorted, dense)) = sorted else { return Ok(along.len()) };
-    items.copy_from_slice(&sorted);
-    Ok(dense)
+    fill(items, |i| Item { position: raster.position(along[i]), index: id32(i) });
+    let is_sparse = |i: &usize| fits[raster.number(along[*i])].kind().is_sparse();
+    let sparse: Vec<usize> =
+        ranges(along.len(), |range| range.filter(is_sparse).collect::<Vec<_>>()).concat();
+    if sparse.is_empty() {
+        return along.len();
+    }
+    let last: Vec<Item> = sparse.iter().map(|i| items[*i]).collect();
+    let mut count = sparse[0];
+    for (k, i) in sparse.iter().enumerate() {
+        let end = sparse.get(k + 1).map_or(along.len(), |next| *next);
+        items.copy_within(i + 1..end, count);
+        count += end - (i + 1);
+    }
+    items[count..].copy_from_slice(&last);
+    count - count % leaf_size
 }
 
 /// Returns `true` if a leaf is longer than its spacing suggests, as where it has points on both sides
