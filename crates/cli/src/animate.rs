@@ -1,23 +1,28 @@
 //! `animate`: asks about a mesh or scan that deforms from frame to frame.
 
 mod body;
+mod film;
 mod frames;
 mod kinetic;
 mod moment;
+mod page;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use self::body::AnimateMethod;
-use self::body::{Asking, Body, Still};
+use self::body::{Asking, Body, Following, Partner, Still};
 use self::frames::Frames;
 use self::kinetic::KineticMeshes;
 use self::moment::{Moment, Summary};
 use crate::console::{Console, Results, now};
+use crate::digits::short;
 use crate::error::CliError;
 use crate::input::Opening;
 use crate::mesh::two_meshes::micros_since;
 use crate::parse::parse_threads;
 use crate::threads::pool;
+use crate::viewpoint::ViewArgs;
+use crate::{output, picture};
 use clap::Args;
 use nearmiss::Renewal;
 
@@ -51,6 +56,15 @@ pub struct AnimateArgs {
     /// Check a prepared --against in full before use: checksums, and every number
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
+    /// Draw the bodies at up to eight query times, coloured by their clearance, as PNG
+    #[arg(long, value_name = "OUT.png", help_heading = "Output")]
+    pub image: Option<PathBuf>,
+    /// From where the pictures are taken
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// Write a page with these pictures, and with events, update and query times over time
+    #[arg(long, value_name = "OUT.html", help_heading = "Output")]
+    pub html: Option<PathBuf>,
     /// Print one JSON object for each query time
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -62,8 +76,18 @@ pub struct AnimateArgs {
 /// The greatest number of query times.
 const MOST_TIMES: f64 = 1e9;
 
+/// The least number of query times between two files at which kinetic trees are considered: every file
+/// is a knot of all plans, at which all certificates are computed again.
+const OFTEN: f64 = 8.0;
+
 pub(crate) fn run(args: &AnimateArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
+    let inputs: Vec<&Path> =
+        args.frames.iter().chain(&args.against).chain(&args.against_frames).map(PathBuf::as_path).collect();
+    for path in args.image.iter().chain(&args.html) {
+        output::check_apart(path, &inputs)?;
+    }
+    args.image.as_deref().map(picture::check_name).transpose()?;
     let frames = Frames::read(&args.frames, console)?;
     let others = match args.against_frames.as_slice() {
         [] => None,
@@ -78,59 +102,144 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), CliError> {
     }
     let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
     let still = args.against.as_deref().map(|path| Still::open(opening, path)).transpose()?;
-    let pool = pool(opening.threads)?;
-    let mut results = Results::new();
-    animate(args, &pool, (&frames, others.as_ref(), still.as_ref()), &mut results)?;
-    results.flush()
+    let partner = match (&others, &still) {
+        (Some(others), _) => Partner::Moving(others),
+        (None, Some(still)) => Partner::Still(still),
+        (None, None) => Partner::Nothing,
+    };
+    let following = if is_kinetic(args, &frames, partner, console)? { None } else { args.method.following() };
+    let mut told = Told { args, results: Results::new(), summary: Summary::default(), moments: Vec::new() };
+    match following {
+        None => told.follow_events(&frames, partner)?,
+        Some(following) => told.follow_frames(&frames, partner, following)?,
+    }
+    told.finish(&frames, partner, console)
 }
 
-/// Moves the bodies through all query times.
-fn animate(
+/// Returns `true` if kinetic trees follow the motion: if they are asked for, or by default if they take
+/// less time than refitting.
+fn is_kinetic(
     args: &AnimateArgs,
-    pool: &rayon::ThreadPool,
-    (frames, others, still): (&Frames, Option<&Frames>, Option<&Still>),
-    results: &mut Results,
-) -> Result<(), CliError> {
-    let mut summary = Summary::default();
-    let last = frames.last();
-    #[expect(clippy::cast_precision_loss, reason = "the last frame is found exactly")]
-    let times = (0_u64..).map(|i| i as f64 / args.rate).take_while(|t| *t <= last);
-    let Some(following) = args.method.following() else {
-        let mut meshes = KineticMeshes::new(frames, others, still)?;
-        for t in times {
-            let moment = meshes.at(t)?;
-            summary.add(&moment);
-            moment.print(args.json, results)?;
-        }
-        return if args.json { Ok(()) } else { results.line(summary.text()) };
-    };
-    let mut body = Body::first(frames)?;
-    let mut other = others.map(Body::first).transpose()?;
-    let (mut asking, mut vertices) = (Asking::default(), Vec::new());
-    for t in times {
-        let (mut bv_updates, mut rebuilt, mut update_micros) = (0, 0, 0.0);
-        for (body, frames) in [(Some(&mut body), Some(frames)), (other.as_mut(), others)] {
-            let (Some(body), Some(frames)) = (body, frames) else { continue };
-            frames.at(t, &mut vertices);
-            let start = now();
-            let renewal = pool.install(|| body.move_to(&vertices, following));
-            let renewal = renewal.map_err(|cause| frames.fault(t, &cause))?;
-            update_micros += micros_since(start);
-            bv_updates += body.nodes() as u64;
-            rebuilt += usize::from(renewal == Renewal::Rebuilt);
-        }
-        let start = now();
-        let found = match (&other, still) {
-            (Some(other), _) => Some(asking.of_two(&body, other)?),
-            (None, Some(still)) => Some(asking.against(&body, still)?),
-            (None, None) => asking.of_itself(&body),
-        };
-        let query_micros = micros_since(start);
-        let moment = Moment { t, bv_updates, events: 0, rebuilt, update_micros, query_micros, found };
-        summary.add(&moment);
-        moment.print(args.json, results)?;
+    frames: &Frames,
+    partner: Partner<'_>,
+    console: Console,
+) -> Result<bool, CliError> {
+    if args.method != AnimateMethod::Auto {
+        return Ok(args.method == AnimateMethod::Kinetic);
     }
-    if args.json { Ok(()) } else { results.line(summary.text()) }
+    let are_meshes = frames.triangles.is_some()
+        && match partner {
+            Partner::Moving(others) => others.triangles.is_some(),
+            Partner::Still(still) => matches!(still, Still::Mesh(_)),
+            Partner::Nothing => false,
+        };
+    if !are_meshes || args.rate < OFTEN || frames.len() < 2 {
+        return Ok(false);
+    }
+    let crossover = KineticMeshes::new(frames, partner)?.crossover()?;
+    let is_kinetic = args.rate > crossover;
+    console.note(format_args!(
+        "{} at {} query times a second: kinetic trees take less time from about {} on",
+        if is_kinetic { "kinetic trees" } else { "refitting" },
+        short(args.rate),
+        short(crossover)
+    ));
+    Ok(is_kinetic)
+}
+
+/// What is told about the query times.
+struct Told<'a> {
+    args: &'a AnimateArgs,
+    results: Results,
+    summary: Summary,
+    /// The query times, if they are shown later.
+    moments: Vec<Moment>,
+}
+
+impl Told<'_> {
+    /// Moves two meshes through all query times by events.
+    fn follow_events(&mut self, frames: &Frames, partner: Partner<'_>) -> Result<(), CliError> {
+        let mut meshes = KineticMeshes::new(frames, partner)?;
+        times(self.args.rate, frames.last()).try_for_each(|t| {
+            let moment = meshes.at(t)?;
+            self.tell(moment)
+        })
+    }
+
+    /// Moves the bodies through all query times frame by frame.
+    fn follow_frames(
+        &mut self,
+        frames: &Frames,
+        partner: Partner<'_>,
+        following: Following,
+    ) -> Result<(), CliError> {
+        let pool = pool(self.args.threads.unwrap_or(0))?;
+        let mut body = Body::first(frames)?;
+        let mut other = partner.frames().map(Body::first).transpose()?;
+        let (mut asking, mut vertices) = (Asking::default(), Vec::new());
+        for t in times(self.args.rate, frames.last()) {
+            let (mut bv_updates, mut rebuilt, mut update_micros) = (0, 0, 0.0);
+            for (body, frames) in [(Some(&mut body), Some(frames)), (other.as_mut(), partner.frames())] {
+                let (Some(body), Some(frames)) = (body, frames) else { continue };
+                frames.at(t, &mut vertices);
+                let start = now();
+                let renewal = pool.install(|| body.move_to(&vertices, following));
+                let renewal = renewal.map_err(|cause| frames.fault(t, &cause))?;
+                update_micros += micros_since(start);
+                bv_updates += body.nodes() as u64;
+                rebuilt += usize::from(renewal == Renewal::Rebuilt);
+            }
+            let start = now();
+            let found = match (&other, partner) {
+                (Some(other), _) => Some(asking.of_two(&body, other)?),
+                (None, Partner::Still(still)) => Some(asking.against(&body, still)?),
+                _ => asking.of_itself(&body),
+            };
+            let query_micros = micros_since(start);
+            self.tell(Moment { t, bv_updates, events: 0, rebuilt, update_micros, query_micros, found })?;
+        }
+        Ok(())
+    }
+
+    fn tell(&mut self, moment: Moment) -> Result<(), CliError> {
+        self.summary.add(&moment);
+        if self.args.image.is_some() || self.args.html.is_some() {
+            self.moments.push(moment);
+        }
+        moment.print(self.args.json, &mut self.results)
+    }
+
+    /// Writes the summary, the pictures and the page.
+    fn finish(mut self, frames: &Frames, partner: Partner<'_>, console: Console) -> Result<(), CliError> {
+        let Self { args, moments, .. } = &self;
+        if args.image.is_some() || args.html.is_some() {
+            let bar = console.spinner("painting the motion");
+            let film = film::paint(frames, partner, moments, &args.view)?;
+            if let Some(path) = &args.image {
+                output::save_picture(&film, path)?;
+            }
+            if let Some(path) = &args.html {
+                let name = frames
+                    .first()
+                    .0
+                    .file_name()
+                    .map_or_else(String::new, |name| name.to_string_lossy().into());
+                let text = self.summary.text();
+                output::replace_plain(path, |out| page::write(&name, &text, &film, moments, out))?;
+            }
+            drop(bar);
+        }
+        if !args.json {
+            self.results.line(self.summary.text())?;
+        }
+        self.results.flush()
+    }
+}
+
+/// Returns the query times up to `last`.
+#[expect(clippy::cast_precision_loss, reason = "the last frame is found exactly")]
+fn times(rate: f64, last: f64) -> impl Iterator<Item = f64> {
+    (0_u64..).map(move |i| i as f64 / rate).take_while(move |t| *t <= last)
 }
 
 /// Parses a number of query times a second.

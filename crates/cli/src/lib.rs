@@ -49,6 +49,7 @@ mod answer_report;
 mod contacts;
 mod digits;
 mod health;
+mod html;
 mod meaning;
 mod report;
 mod search;

@@ -6,5 +6,6 @@ pub(crate) mod covering;
 pub(crate) mod enclosure;
 pub(crate) mod extents;
 pub(crate) mod parts;
+pub(crate) mod pixels;
 pub(crate) mod samples;
 pub(crate) mod surfels;

@@ -6,5 +6,6 @@ pub(crate) mod gather;
 pub(crate) mod kind;
 pub(crate) mod leaf_block;
 pub(crate) mod neighbours;
+pub(crate) mod raster;
 pub(crate) mod spacing;
 pub(crate) mod stored_point;

@@ -1,9 +1,11 @@
 //! A prepared scan: its construction, and the queries about it alone.
 
+pub(crate) mod anew;
 pub(crate) mod apart;
 pub(crate) mod arrays;
 pub(crate) mod build;
 pub(crate) mod cells;
+pub(crate) mod closing;
 pub(crate) mod data;
 pub(crate) mod deform_error;
 pub(crate) mod deforming;
@@ -14,6 +16,7 @@ pub(crate) mod metric;
 pub(crate) mod nearest;
 pub(crate) mod options;
 pub(crate) mod ordered;
+pub(crate) mod organised;
 pub(crate) mod outline;
 pub(crate) mod points;
 pub(crate) mod prepare;

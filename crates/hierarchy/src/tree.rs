@@ -1,5 +1,6 @@
 //! The tree over the points: its topology, its split, and the boxes of siblings side by side.
 
+pub(crate) mod axes;
 pub(crate) mod split;
 pub(crate) mod topology;
 pub(crate) mod wide;

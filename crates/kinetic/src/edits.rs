@@ -165,3 +165,37 @@ impl KineticTree {
         self.grow(node, &primitives);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_with_an_unbalanced_node_is_refused() {
+        let plans = (0..64_u8).map(|i| FlightPlan::at_rest(0.0, [f64::from(i), 0.0, 0.0]).unwrap());
+        let mut tree = KineticTree::of_points(0.0, plans).unwrap();
+        let load = |tree: &KineticTree| {
+            let mut file = Vec::new();
+            tree.write_to(&mut file).unwrap();
+            KineticTree::from_bytes(file).map(|tree| tree.height())
+        };
+        assert!(load(&tree).is_ok(), "as it was built");
+        // All but four points of the left half vanish, and the root is not built again, as in a file
+        // that lies: its height could be that of a list.
+        let [left, right] = [0, 1].map(|k| tree.nodes.link(ROOT).children + k);
+        let mut all = Vec::new();
+        tree.nodes.gather(left, &mut all);
+        let gone = all.split_off(4);
+        tree.nodes.mark(left, FRESH);
+        tree.grow(left, &all);
+        gone.into_iter().for_each(|primitive| tree.primitives.remove(primitive));
+        tree.nodes.link_mut(ROOT).size = 4 + tree.nodes.link(right).size;
+        tree.refresh();
+        assert!(tree.nodes.is_unbalanced(ROOT), "32 of 36 points are on the right");
+        let fault = load(&tree).unwrap_err();
+        assert!(
+            matches!(fault, KineticError::Damaged { what: "size of node", index } if index == ROOT as usize),
+            "{fault}"
+        );
+    }
+}

@@ -119,6 +119,17 @@ pub fn fill_runs<T: Send>(out: &mut [T], length: usize, f: impl Fn(usize, &mut [
     out.chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
 }
 
+/// Does the same as [`fill_runs`] for expensive `f`: the runs are scheduled one by one.
+pub fn change_runs<T: Send>(out: &mut [T], length: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        out.par_chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
+    }
+    #[cfg(not(feature = "rayon"))]
+    out.chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
+}
+
 /// Passes every item to `f`.
 pub fn for_each<T: Send>(items: Vec<T>, f: impl Fn(T) + Sync + Send) {
     #[cfg(feature = "rayon")]
@@ -232,6 +243,8 @@ mod tests {
         let mut out = vec![0; 10];
         fill_runs(&mut out, 4, |number, run| run.fill(number));
         assert_eq!(out, [0, 0, 0, 0, 1, 1, 1, 1, 2, 2]);
+        change_runs(&mut out, 5, |number, run| run.fill(run.len() + number));
+        assert_eq!(out, [5, 5, 5, 5, 5, 6, 6, 6, 6, 6]);
         fill(&mut out, |i| 3 * i);
         assert_eq!(out[9], 27);
     }

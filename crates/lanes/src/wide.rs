@@ -111,29 +111,16 @@ impl Iterator for Bits {
 #[inline(always)]
 #[must_use]
 pub fn least<S: Simd>(lanes: f32x16<S>, least: f32) -> f32 {
-    fold(lanes, least, |a, b| if a < b { a } else { b })
+    let own = lanes.reduce_min();
+    if own < least { own } else { least }
 }
 
 /// Returns the maximum of all lanes and `greatest`. None of them may be NaN.
 #[inline(always)]
 #[must_use]
 pub fn greatest<S: Simd>(lanes: f32x16<S>, greatest: f32) -> f32 {
-    fold(lanes, greatest, |a, b| if a > b { a } else { b })
-}
-
-/// Folds the upper half of the lanes onto the lower until one is left; minima and maxima do not
-/// depend on the order.
-#[inline(always)]
-fn fold<S: Simd>(lanes: f32x16<S>, with: f32, f: impl Fn(f32, f32) -> f32) -> f32 {
-    let mut lanes = lanes.to_array();
-    let mut width = WIDTH / 2;
-    while width > 0 {
-        for i in 0..width {
-            lanes[i] = f(lanes[i], lanes[i + width]);
-        }
-        width /= 2;
-    }
-    f(lanes[0], with)
+    let own = lanes.reduce_max();
+    if own > greatest { own } else { greatest }
 }
 
 #[cfg(test)]

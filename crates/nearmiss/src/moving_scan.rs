@@ -134,6 +134,33 @@ impl MovingScan {
         self.scan.replace(points)
     }
 
+    /// Replaces the scan by an organised depth frame: a point for each pixel, row by row, `width` in
+    /// each, with NaN or zero where nothing was measured.
+    ///
+    /// ```
+    /// use nearmiss::{BuildOptions, MovingScan};
+    ///
+    /// // A camera looks at a wall, two units away and slowly nearer.
+    /// let frame = |time: f64| -> Vec<[f64; 3]> {
+    ///     let pixels = (0..64 * 48_u32).map(|i| [f64::from(i % 64) - 32.0, f64::from(i / 64) - 24.0]);
+    ///     let depth = 2.0 - 0.1 * time;
+    ///     let place = |[u, v]: [f64; 2]| [u * depth / 60.0, v * depth / 60.0, depth];
+    ///     pixels.map(|p| if p == [3.0, 5.0] { [f64::NAN; 3] } else { place(p) }).collect()
+    /// };
+    /// let mut seen = MovingScan::new(&frame(0.0)[..64 * 29], &BuildOptions::default())?;
+    /// for step in 1..4 {
+    ///     seen.replace_organised(&frame(f64::from(step)), 64)?;
+    ///     assert_eq!(seen.len(), 64 * 48 - 1);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`DeformingScan::replace_organised`].
+    pub fn replace_organised(&mut self, points: &[[f64; 3]], width: usize) -> Result<(), DeformError> {
+        self.scan.replace_organised(points, width)
+    }
+
     /// Returns the current frame as a still scan, for example to save it. Later frames do not change
     /// it.
     #[must_use]

@@ -11,6 +11,7 @@ mod meet;
 mod neighbourhood;
 mod options;
 mod project;
+mod side_by_side;
 
 pub use eigen::{Eigen3, symmetric_eigen};
 pub use eigen_batch::{EigenBlock, MatrixBlock, symmetric_eigen_batch};
@@ -22,3 +23,4 @@ pub use meet::{Meeting, meet, step_onto_both};
 pub use neighbourhood::{Centre, HalfBlock, MeasuredBlock, Moments, Neighbourhood};
 pub use options::{Bandwidth, Metric, SurfaceError, SurfaceOptions, SurfacePlan};
 pub use project::{Projection, project};
+pub use side_by_side::SideBySide;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicU64;
 
-use nearmiss::{BuildOptions, Scan};
+use nearmiss::{BuildOptions, MovingScan, Scan};
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
 use crate::claim::{Checker, Kind};
@@ -34,11 +34,16 @@ fn trial() -> &'static Trial {
 
 impl Trial {
     fn new(margin: &str, shifts: &[f64]) -> Self {
+        let cloud = nearmiss::io::read(dragon_path(Dragon::Points5k), None).unwrap().cloud;
+        Self::of(&Scan::build(&cloud, &BuildOptions::default()).unwrap(), margin, shifts)
+    }
+
+    /// Asks about `cloud` and itself, shifted.
+    fn of(cloud: &Scan, margin: &str, shifts: &[f64]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let [scan, poses, proof] =
             ["dragon.nm", "poses.jsonl", "proof.jsonl"].map(|name| folder.path().join(name));
-        let cloud = nearmiss::io::read(dragon_path(Dragon::Points5k), None).unwrap().cloud;
-        Scan::build(&cloud, &BuildOptions::default()).unwrap().save(&scan).unwrap();
+        cloud.save(&scan).unwrap();
         let identity = "[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]";
         let line =
             |y: &f64| format!("{{\"a\":{identity},\"b\":[0.8,0,-0.6,0,0,1,0,{y},0.6,0,0.8,0,0,0,0,1]}}\n");
@@ -96,6 +101,41 @@ fn what_the_search_proves_holds() {
     assert_eq!(sampled.faults, Vec::<String>::new());
     assert_eq!(sampled.points, 20_000);
     assert!(sampled.fill > 0.5 && sampled.fill <= 1.0 && sampled.far > 0.3, "{sampled:?}");
+}
+
+/// The frames of scans that moved: bent, so that discs are carried along and some fitted anew; fitted
+/// anew in the old order; and replaced by a picture of depths.
+#[test]
+fn what_the_search_proves_about_moved_frames_holds() {
+    let dragon = nearmiss::io::read(dragon_path(Dragon::Points5k), None).unwrap().cloud;
+    let frame: Vec<[f64; 3]> = dragon.positions().iter().map(|p| dragon.frame().to_world(*p)).collect();
+    let mut scan = MovingScan::new(&frame, &BuildOptions::default()).unwrap();
+    let bent: Vec<[f64; 3]> =
+        frame.iter().map(|[x, y, z]| [1.1 * x + 0.3 * z * z, y + 0.01 * (60.0 * x).sin(), *z]).collect();
+    let refitted = scan.refit(&bent).unwrap();
+    assert!(refitted.carried > 1000 && refitted.fitted > 50, "{refitted:?}");
+    let mut trials = vec![("refitted", Trial::of(&scan.still(), "0", &[0.06, 0.14, 0.16, 0.2]))];
+    scan.renew(&bent).unwrap();
+    trials.push(("renewed", Trial::of(&scan.still(), "0", &[0.06, 0.14, 0.16, 0.2])));
+    let depth = |i: u32| {
+        let [u, v] = [f64::from(i % 64) - 31.5, f64::from(i / 64) - 23.5];
+        let z = if u * u + v * v < 180.0 { 1.4 } else { 2.0 + 0.004 * u };
+        if i % 97 == 0 { [f64::NAN; 3] } else { [u * z / 60.0, v * z / 60.0, z] }
+    };
+    scan.replace_organised(&(0..64 * 48).map(depth).collect::<Vec<_>>(), 64).unwrap();
+    trials.push(("a depth frame", Trial::of(&scan.still(), "0", &[0.1, 1.5, 3.0, 4.0])));
+    for (name, trial) in trials {
+        let (mut apart, mut meeting) = (0, 0);
+        for line in &trial.lines {
+            let finding = trial.checker().check(line);
+            assert_eq!(finding.faults, Vec::<String>::new(), "{name}, line {}", line.query);
+            apart += usize::from(finding.kind == Kind::Separated);
+            meeting += usize::from(finding.kind == Kind::Intersecting);
+        }
+        assert!(apart >= 1 && meeting >= 1, "{name}: {apart} apart, {meeting} meeting");
+        let sampled = surface::check(&trial.subject, 10_000, 1, &AtomicU64::new(0));
+        assert_eq!(sampled.faults, Vec::<String>::new(), "{name}");
+    }
 }
 
 #[test]

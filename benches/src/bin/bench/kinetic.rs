@@ -7,10 +7,12 @@
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
+use nearmiss::Aabb;
 use nearmiss::io::{Pieces, read_in_pieces};
 use nearmiss::kinetic::{Counts, FlightPlan, KineticTree};
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::bumpy_sphere;
+use nearmiss_benches::plot::{Axis, Line, Panel, figure};
 use nearmiss_benches::rivals::refit::FlatTree;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
@@ -36,6 +38,9 @@ pub(crate) struct Options {
     /// Frames from one knot to the next
     #[arg(long, value_name = "N", default_value_t = 10.0)]
     frames: f64,
+    /// Draw updates, update time and total time over the rate of frames, as SVG
+    #[arg(long, value_name = "OUT.svg")]
+    image: Option<PathBuf>,
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -45,7 +50,8 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}", machine::description());
     crossing(options)?;
     rates(options)?;
-    smooth(options)
+    smooth(options)?;
+    options.image.as_deref().map_or(Ok(()), |path| plots(options, path))
 }
 
 /// Points in a cube, with velocities up to 1 along each axis.
@@ -201,6 +207,110 @@ fn smooth(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The boxes about points that are sought in each frame, and half their size.
+const BOXES: usize = 20;
+const HALF: f64 = 0.05;
+
+/// Draws the three plots of the slides for the surface with waves, with a knot every ten frames of
+/// 60 Hz: changes of boxes, time of an update, and with queries for the primitives in some boxes.
+fn plots(options: &Options, path: &Path) -> Result<(), Failure> {
+    let knot = options.frames / RATE;
+    let Sequence { knots, name, .. } = waves(options.surface, knot);
+    let times: Vec<f64> = (0_u32..).zip(&knots).map(|(i, _)| f64::from(i) * knot).collect();
+    let plan = |point: usize| {
+        let places: Vec<[f64; 3]> = knots.iter().map(|places| places[point]).collect();
+        FlightPlan::through(&times, &places)
+    };
+    let plans = (0..knots[0].len()).map(plan).collect::<Result<Vec<_>, _>>()?;
+    let start = KineticTree::of_points(0.0, plans.iter().cloned())?;
+    let nodes = count(start.node_count());
+    let mut lines: [[Vec<[f64; 2]>; 2]; 3] = Default::default();
+    println!("\n## Over the rate of frames: {name}\n");
+    println!(
+        "| frames / s | updates / frame | refit's | update, ms | refit, ms | with queries, ms | refit, with queries, ms |"
+    );
+    println!("| --: |{}", " --: |".repeat(6));
+    let seconds = times[times.len() - 1];
+    for rate in [15_u32, 30, 60, 120, 240, 480, 960] {
+        let mut tree = start.clone();
+        let (mut own, mut asked, mut refit) = (0.0, 0.0, f64::INFINITY);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of frames")]
+        let frames = (seconds * f64::from(rate)) as u32;
+        for frame in 1..=frames {
+            let (result, time) = timed(|| tree.advance(f64::from(frame) / f64::from(rate)));
+            result?;
+            own += nanoseconds(time) / 1e6;
+            let (_, time) = timed(|| {
+                for i in 0..BOXES {
+                    let point = u32::try_from(i * knots[0].len() / BOXES).unwrap_or_default();
+                    let place = tree.position(point).unwrap_or_default();
+                    let bounds = Aabb { min: place.map(|x| x - HALF), max: place.map(|x| x + HALF) };
+                    tree.in_box(&bounds, |primitive| {
+                        black_box(primitive);
+                    });
+                }
+            });
+            asked += nanoseconds(time) / 1e6;
+        }
+        let (mut flat, positions) = flattened(&tree, knots[0].len(), false)?;
+        for _ in 0..20 {
+            refit =
+                f64::min(refit, nanoseconds(timed(|| black_box(flat.refit(black_box(&positions)))).1) / 1e6);
+        }
+        let each = |total: f64| total / f64::from(frames);
+        let (updates, own, asked) = (each(per(tree.counts().updates, 1)), each(own), each(asked));
+        let rows = [[updates, nodes], [own, refit], [own + asked, refit + asked]];
+        for (lines, row) in lines.iter_mut().zip(rows) {
+            for (line, y) in lines.iter_mut().zip(row) {
+                line.push([f64::from(rate), y]);
+            }
+        }
+        println!(
+            "| {rate} | {updates:.0} | {nodes:.0} | {own:.3} | {refit:.3} | {:.3} | {:.3} |",
+            own + asked,
+            refit + asked
+        );
+    }
+    let titles = [
+        ("Bounding-volume updates", "updates per frame"),
+        ("Update time", "ms per frame"),
+        ("Total time with queries", "ms per frame"),
+    ];
+    let panels: Vec<Panel> = titles
+        .into_iter()
+        .zip(lines)
+        .map(|((title, y), lines)| Panel {
+            title: title.into(),
+            axes: [Axis::logarithmic("frames per second"), Axis::logarithmic(y)],
+            lines: lines
+                .into_iter()
+                .zip(["kinetic", "refit"])
+                .enumerate()
+                .map(|(colour, (points, name))| Line { name: name.into(), points, colour, dashed: false })
+                .collect(),
+        })
+        .collect();
+    std::fs::write(path, figure(&panels)?)?;
+    println!("\nDrawn in {}", path.display());
+    Ok(())
+}
+
+/// The flat tree over the primitives of a kinetic one, in the same order, and the present places.
+fn flattened(
+    tree: &KineticTree,
+    points: usize,
+    by_triangles: bool,
+) -> Result<(FlatTree, Vec<[f32; 4]>), Failure> {
+    let mut order = Vec::new();
+    tree.for_each_node(|_, primitives| order = primitives.to_vec());
+    #[expect(clippy::cast_possible_truncation, reason = "a refit in single precision")]
+    let single = |p: [f64; 3]| [p[0] as f32, p[1] as f32, p[2] as f32, 0.0];
+    let ids = 0..u32::try_from(points)?;
+    let positions = ids.map(|i| single(tree.position(i).unwrap_or_default())).collect();
+    let corners = order.iter().flat_map(|&primitive| tree.primitive(primitive).unwrap_or_default());
+    Ok((FlatTree::new(corners.copied().collect(), if by_triangles { 12 } else { 8 }), positions))
+}
+
 /// Times in milliseconds, and counts, of the advance through all knots.
 #[derive(Debug, Default)]
 struct Run {
@@ -239,18 +349,12 @@ fn compare(sequence: &Sequence, knot: f64, by_triangles: bool) -> Result<(), Fai
     } else {
         KineticTree::of_points(0.0, plans.iter().cloned())?
     };
-    let mut order = Vec::new();
-    tree.for_each_node(|_, primitives| order = primitives.to_vec());
+    let (mut flat, _) = flattened(&tree, points, by_triangles)?;
     let run = Run::through(&mut tree, &times[1..])?;
     let counts = tree.counts();
     let seconds = times[times.len() - 1];
     let frames = seconds * RATE;
-    #[expect(clippy::cast_possible_truncation, reason = "a refit in single precision")]
-    let single = |p: [f64; 3]| [p[0] as f32, p[1] as f32, p[2] as f32, 0.0];
-    let ids = 0..u32::try_from(points)?;
-    let positions: Vec<[f32; 4]> = ids.map(|i| single(tree.position(i).unwrap_or_default())).collect();
-    let corners = order.iter().flat_map(|&primitive| tree.primitive(primitive).unwrap_or_default());
-    let mut flat = FlatTree::new(corners.copied().collect(), if by_triangles { 12 } else { 8 });
+    let (_, positions) = flattened(&tree, points, by_triangles)?;
     let refits = (0..50).map(|_| nanoseconds(timed(|| black_box(flat.refit(black_box(&positions)))).1) / 1e3);
     let refit = refits.fold(f64::INFINITY, f64::min);
     let nodes = count(tree.node_count());

@@ -1,5 +1,5 @@
 //! Meshes and scans that deform: the times of refitting, renewing and preparing anew, and the answers
-//! of each.
+//! of each. Frames of a depth camera that replace each other.
 //!
 //! The frames of a mesh are files. A scan of it has points that are spread over the surface of the
 //! first frame and move with their triangles. Two copies are asked in every frame, at the same poses
@@ -22,8 +22,8 @@ use rand::RngExt;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Frames of a mesh, one file each; the first one has faces
-    #[arg(required = true, value_name = "FRAME")]
+    /// Frames of a mesh, one file each; the first one has faces. Without any, frames of a depth camera
+    #[arg(value_name = "FRAME")]
     frames: Vec<PathBuf>,
     /// Frames between two files
     #[arg(long, value_name = "N", default_value_t = 4)]
@@ -44,6 +44,9 @@ type Frames = Vec<Vec<[f64; 3]>>;
 
 pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}\n", machine::description());
+    if options.frames.is_empty() {
+        return depth_frames(options);
+    }
     let (files, triangles) = read(&options.frames)?;
     let mut frames = Frames::new();
     for pair in files.windows(2) {
@@ -136,7 +139,7 @@ fn meshes(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<
     let mut times: [Times; 5] = std::array::from_fn(|_| Times::default());
     let [refit, rebuild, ask_refitted, ask_anew, itself] = &mut times;
     let (mut scratch, mut wrong, mut hits, mut folded) = (MeshScratch::default(), 0, 0, 0);
-    let mut loosest = 1.0_f64;
+    let (mut loosest, mut by_looseness) = (1.0_f64, ByLooseness::default());
     let ask = |mesh: &MovingMesh, pose: &Pose, times: &mut Times, scratch: &mut MeshScratch| {
         let pair = MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(pose));
         times.of(|| black_box(pair.collide(scratch)).verdict.is_intersecting())
@@ -145,12 +148,14 @@ fn meshes(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<
         refit.of(|| refitted.refit(frame))?;
         rebuild.of(|| anew.rebuild(frame))?;
         loosest = loosest.max(refitted.looseness());
+        let asked = ask_refitted.0.len();
         for pose in about(&poses, refitted.bounds().centre()) {
             let found = ask(&refitted, &pose, ask_refitted, &mut scratch);
             let expected = ask(&anew, &pose, ask_anew, &mut scratch);
             wrong += usize::from(found != expected);
             hits += usize::from(expected);
         }
+        by_looseness.add(refitted.looseness(), [&ask_refitted.0[asked..], &ask_anew.0[asked..]]);
         let question = MeshItself::new(refitted.at(&Pose::IDENTITY));
         folded += usize::from(itself.of(|| question.collide(&mut scratch)).verdict.is_intersecting());
     }
@@ -163,7 +168,36 @@ fn meshes(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<
         frames.len() * poses.len(),
         frames.len()
     );
+    by_looseness.print();
     Ok(())
+}
+
+/// The times of queries by the looseness of the boxes, of refitted things and of those prepared anew.
+#[derive(Debug, Default)]
+struct ByLooseness([(usize, [f64; 2]); LOOSENESS.len()]);
+
+/// The least looseness of each class.
+const LOOSENESS: [f64; 7] = [0.0, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0];
+
+impl ByLooseness {
+    fn add(&mut self, looseness: f64, times: [&[f64]; 2]) {
+        let class = LOOSENESS.partition_point(|least| *least <= looseness).saturating_sub(1);
+        let (frames, sums) = &mut self.0[class];
+        *frames += 1;
+        for (sum, times) in sums.iter_mut().zip(times) {
+            *sum += times.iter().sum::<f64>() / count(times.len());
+        }
+    }
+
+    fn print(&self) {
+        println!(
+            "\n| looseness from | frames | ask refitted, µs | anew, µs | ratio |\n| --: | --: | --: | --: | --: |"
+        );
+        for (least, (frames, sums)) in LOOSENESS.iter().zip(&self.0).filter(|(_, (frames, _))| *frames > 0) {
+            let [refitted, anew] = sums.map(|sum| sum / count(*frames));
+            println!("| {least} | {frames} | {refitted:.1} | {anew:.1} | {:.2} |", refitted / anew);
+        }
+    }
 }
 
 /// Spreads points over a mesh. They move with their triangles.
@@ -219,7 +253,7 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
         let pair = Pair::new(scan.at(&Pose::IDENTITY), Placed::new(scan, pose));
         Ok(times.of(|| black_box(pair.collide(&plan, &mut scratch))))
     };
-    let mut totals = Totals::default();
+    let (mut totals, mut by_looseness) = (Totals::default(), ByLooseness::default());
     for frame in &frames {
         let done = refit.of(|| refitted.refit(frame))?.fitted;
         totals.fitted += done;
@@ -227,6 +261,7 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
         totals.loosest = refitted.looseness().max(totals.loosest);
         renew.of(|| renewed.renew(frame))?;
         rebuild.of(|| anew.rebuild(frame))?;
+        let before = ask_refitted.0.len();
         for pose in about(&poses, refitted.bounds().centre()) {
             let expected = ask(&anew, &pose, ask_anew)?;
             let asked = [(&refitted, &mut *ask_refitted), (&renewed, &mut *ask_renewed)];
@@ -244,6 +279,7 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
             totals.proven[2] += usize::from(is_proof(&expected.verdict));
             totals.apart += usize::from(expected.verdict.is_separated());
         }
+        by_looseness.add(refitted.looseness(), [&ask_refitted.0[before..], &ask_anew.0[before..]]);
     }
     heading(&format!("a scan of {} points", refitted.len()));
     let names = ["refit", "renew", "prepare anew", "ask, refitted", "ask, renewed", "ask, prepared anew"];
@@ -256,6 +292,112 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
         frames.len() * poses.len(),
         100.0 * count(fitted) / count(frames.len() * refitted.len()),
         100.0 * count(most) / count(refitted.len()),
+    );
+    by_looseness.print();
+    Ok(())
+}
+
+/// A room as a depth camera sees it, with noise and holes: two walls, a floor, and balls that move.
+fn depth_frame([width, height]: [u32; 2], time: f64, rng: &mut impl rand::Rng) -> Vec<[f64; 3]> {
+    let focus = 0.82 * f64::from(width);
+    let balls = [
+        ([-0.5 + 0.3 * time.sin(), 0.3, 2.0], 0.5),
+        ([0.7, 0.6 - 0.2 * time.cos(), 2.6], 0.4),
+        ([0.2, -0.5, 1.5 + 0.1 * time], 0.2),
+    ];
+    let mut pixel = |i: u32| {
+        let (u, v) = (i % width, i / width);
+        let d = [f64::from(u) - 0.5 * f64::from(width), f64::from(v) - 0.5 * f64::from(height)]
+            .map(|x| x / focus);
+        let d = [d[0], d[1], 1.0];
+        let mut depth = 4.0_f64;
+        for (slope, away) in [(d[1], 1.2), (d[0], 2.0)] {
+            depth = if slope > 0.0 { depth.min(away / slope) } else { depth };
+        }
+        for (centre, radius) in balls {
+            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let (dd, dc, cc) = (dot(d, d), dot(d, centre), dot(centre, centre) - radius * radius);
+            let root = dc * dc - dd * cc;
+            depth = if root > 0.0 { depth.min((dc - root.sqrt()) / dd) } else { depth };
+        }
+        let [noise, hole] = [rng.random::<f64>(), rng.random::<f64>()];
+        // Quadratic in the depth, as of cameras that triangulate.
+        let depth = depth + 5e-4 * depth * depth * (noise - 0.5);
+        if hole < 0.02 || (u / 40 + v / 40) % 11 == 0 { [f64::NAN; 3] } else { d.map(|x| x * depth) }
+    };
+    (0..width * height).map(&mut pixel).collect()
+}
+
+/// Frames of a depth camera that replace each other, by pixels and as points without order, and a
+/// ball that is asked about in each.
+fn depth_frames(options: &Options) -> Result<(), Failure> {
+    const FRAMES: u32 = 20;
+    let [width, height] = [640, 480];
+    let rng = &mut rng(options.seed);
+    let first: Vec<[f64; 3]> =
+        depth_frame([width, height], 0.0, rng).into_iter().filter(|p| p[2].is_finite()).collect();
+    let built = BuildOptions::default();
+    let mut organised = MovingScan::new(&first, &built)?;
+    let (mut unorganised, mut anew) = (organised.clone(), organised.clone());
+    let tool: Vec<[f64; 3]> =
+        nearmiss_benches::object::bumpy_sphere(5000).into_iter().map(|p| p.map(|x| 0.15 * x)).collect();
+    let tool = MovingScan::new(&tool, &built)?;
+    let mut times: [Times; 6] = std::array::from_fn(|_| Times::default());
+    let [by_pixels, by_points, rebuild, ask_pixels, ask_points, ask_anew] = &mut times;
+    let (mut scratch, mut totals) = (Scratch::default(), Totals::default());
+    let asked = CollideOptions::default().with_evidence(Evidence::Certified);
+    for step in 0..FRAMES {
+        let frame = depth_frame([width, height], 0.1 * f64::from(step), rng);
+        by_pixels.of(|| organised.replace_organised(&frame, width as usize))?;
+        by_points.of(|| unorganised.replace(&frame))?;
+        let measured: Vec<[f64; 3]> = frame.iter().copied().filter(|p| p[2].is_finite()).collect();
+        rebuild.of(|| anew = MovingScan::new(&measured, &built).unwrap_or_else(|_| anew.clone()));
+        for _ in 0..options.poses {
+            let seen = frame[rng.random_range(0..frame.len())];
+            if !seen[2].is_finite() {
+                continue;
+            }
+            let away = unit_vector(rng).map(|c| c * (0.12 + 0.1 * rng.random::<f64>()));
+            let pose = rotation(rng).with_translation([0, 1, 2].map(|k| seen[k] + away[k]));
+            let mut ask = |scan: &MovingScan, times: &mut Times| -> Result<Answer, Failure> {
+                let plan = CollidePlan::new(&asked, scan, &tool)?;
+                let pair = Pair::new(scan.at(&Pose::IDENTITY), tool.at(&pose));
+                Ok(times.of(|| black_box(pair.collide(&plan, &mut scratch))))
+            };
+            let expected = ask(&anew, ask_anew)?;
+            let found = [ask(&organised, ask_pixels)?, ask(&unorganised, ask_points)?];
+            let scans: [&MovingScan; 2] = [&organised, &unorganised];
+            for (k, (found, scan)) in found.iter().zip(scans).enumerate() {
+                totals.proven[k] += usize::from(is_proof(&found.verdict));
+                if found.verdict.is_intersecting() != expected.verdict.is_intersecting() {
+                    totals.differ[k] += 1;
+                    let (apart, answer) =
+                        if expected.verdict.is_intersecting() { (scan, found) } else { (&anew, &expected) };
+                    let plan = DistancePlan::new(&DistanceOptions::default(), apart, &tool)?;
+                    let pair = Pair::new(apart.at(&Pose::IDENTITY), tool.at(&pose));
+                    let distance = pair.distance(&plan, &mut Scratch::default()).upper;
+                    totals.beyond[k] += usize::from(distance > answer.band);
+                }
+            }
+            totals.proven[2] += usize::from(is_proof(&expected.verdict));
+            totals.apart += usize::from(expected.verdict.is_separated());
+        }
+    }
+    heading(&format!("frames of a depth camera: {width} × {height}, {} points", organised.len()));
+    let names = [
+        "replaced by pixels",
+        "replaced by points",
+        "prepare anew",
+        "ask, by pixels",
+        "ask, by points",
+        "ask, prepared anew",
+    ];
+    let asked = times[3].0.len();
+    times.into_iter().zip(names).for_each(|(times, name)| times.row(name));
+    let Totals { differ, beyond, proven, apart, .. } = totals;
+    println!(
+        "\n{differ:?} of {asked} verdicts by pixels and by points differ from those prepared anew, {beyond:?} beyond the \
+         band; of {apart} separations {proven:?} are certified by each"
     );
     Ok(())
 }

@@ -3,24 +3,28 @@
 use std::path::Path;
 
 use clap::ValueEnum;
+use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::io::{Pieces, read_in_pieces};
 use nearmiss::store::File;
 use nearmiss::{
-    Answer, Check, CollideOptions, CollidePlan, DeformError, Evidence, Mesh, MeshAnswer, MeshBuildOptions,
-    MeshItself, MeshPair, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict, MovingMesh, MovingScan, Pair,
-    Placed, PlacedMesh, Pose, Renewal, Scan, Scratch, TriangleMesh, Verdict,
+    Answer, Check, CollideOptions, CollidePlan, DeformError, DistanceOptions, DistancePlan, Evidence, Mesh,
+    MeshAnswer, MeshBuildOptions, MeshItself, MeshPair, MeshScanPair, MeshScanPlan, MeshScratch, MeshVerdict,
+    MovingMesh, MovingScan, Pair, Placed, PlacedMesh, Pose, Renewal, Scan, Scratch, TriangleMesh, Verdict,
 };
 
+use super::film::Solid;
 use super::frames::Frames;
 use crate::answer_report::word;
 use crate::error::CliError;
 use crate::input::{self, Opening};
+use crate::picture::splat;
 
 /// How bounds follow a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[non_exhaustive]
 pub enum AnimateMethod {
-    /// Refit, and prepare anew once that has made the bounds too loose
+    /// Refit, and prepare anew once that has made the bounds too loose; kinetic for two meshes asked so often
+    /// that it takes less
     Auto,
     /// Refit the bounds; the order of triangles or points stays
     Refit,
@@ -62,10 +66,46 @@ pub(super) enum Still {
     Scan(Scan),
 }
 
+/// What a body is tested against.
+#[derive(Clone, Copy)]
+pub(super) enum Partner<'a> {
+    /// Nothing; a mesh is tested against itself.
+    Nothing,
+    /// Something that moves too.
+    Moving(&'a Frames),
+    /// Something that stays.
+    Still(&'a Still),
+}
+
+impl<'a> Partner<'a> {
+    /// Returns the frames of a partner that moves.
+    pub(super) fn frames(self) -> Option<&'a Frames> {
+        match self {
+            Self::Moving(frames) => Some(frames),
+            _ => None,
+        }
+    }
+}
+
 /// Either of them, placed.
-enum View<'a> {
+#[derive(Clone, Copy)]
+pub(super) enum View<'a> {
     Mesh(PlacedMesh<'a>),
     Scan(Placed<'a>),
+}
+
+impl View<'_> {
+    /// Returns what is seen of it.
+    pub(super) fn solid(&self) -> Solid {
+        match self {
+            Self::Mesh(mesh) => {
+                let arrays = mesh.mesh().arrays();
+                let corner = |vertex: u32| Vector3::from(arrays.vertices[vertex as usize]);
+                Solid::Triangles(arrays.triangles.iter().map(|triangle| triangle.map(corner)).collect())
+            }
+            Self::Scan(scan) => Solid::Discs((0..scan.scan().len()).map(|i| splat(scan, i)).collect()),
+        }
+    }
 }
 
 /// A verdict, and its evidence if it has one.
@@ -130,7 +170,7 @@ impl Body {
         }
     }
 
-    fn view(&self) -> View<'_> {
+    pub(super) fn view(&self) -> View<'_> {
         match self {
             Self::Mesh(mesh) => View::Mesh(mesh.at(&Pose::IDENTITY)),
             Self::Scan(scan) => View::Scan(scan.at(&Pose::IDENTITY)),
@@ -152,7 +192,7 @@ impl Still {
         if is_mesh { opening.open_mesh(path).map(Self::Mesh) } else { opening.open(path).map(Self::Scan) }
     }
 
-    fn view(&self) -> View<'_> {
+    pub(super) fn view(&self) -> View<'_> {
         match self {
             Self::Mesh(mesh) => View::Mesh(mesh.at(&Pose::IDENTITY)),
             Self::Scan(scan) => View::Scan(scan.at(&Pose::IDENTITY)),
@@ -182,6 +222,22 @@ impl Asking {
     pub(super) fn of_itself(&mut self, body: &Body) -> Option<Found> {
         let View::Mesh(mesh) = body.view() else { return None };
         Some(of_meshes(&MeshItself::new(mesh).collide(&mut self.of_meshes)))
+    }
+
+    /// Returns the distance of two bodies.
+    pub(super) fn clearance(&mut self, a: View<'_>, b: View<'_>) -> Result<f64, CliError> {
+        let options = DistanceOptions::default();
+        Ok(match (a, b) {
+            (View::Mesh(a), View::Mesh(b)) => MeshPair::new(a, b).distance(&mut self.of_meshes).upper,
+            (View::Scan(a), View::Scan(b)) => {
+                let plan = DistancePlan::new(&options, a.scan(), b.scan())?;
+                Pair::new(a, b).distance(&plan, &mut self.scratch).upper
+            }
+            (View::Mesh(mesh), View::Scan(scan)) | (View::Scan(scan), View::Mesh(mesh)) => {
+                let plan = DistancePlan::new(&options, scan.scan(), scan.scan())?;
+                MeshScanPair::new(scan, mesh).distance(&plan, &mut self.scratch).upper
+            }
+        })
     }
 
     fn ask(&mut self, a: View<'_>, b: View<'_>) -> Result<Found, CliError> {

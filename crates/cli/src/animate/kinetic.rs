@@ -4,12 +4,18 @@ use nearmiss::Mesh;
 use nearmiss::kinetic::{Counts, FlightPlan, KineticError, KineticTree, SeparationList};
 use nearmiss::mesh::triangles_meet;
 
-use super::body::{Found, Still};
+use super::body::{Found, Partner, Still};
 use super::frames::Frames;
 use super::moment::Moment;
 use crate::console::now;
 use crate::error::CliError;
 use crate::mesh::two_meshes::micros_since;
+
+/// Times on one core in nanoseconds, as `bench kinetic` and `bench moving` measured them: of an event,
+/// of a certificate that is computed, and of a refit for each kinetic node. Only their ratios matter.
+const EVENT: f64 = 250.0;
+const CERTIFICATE: f64 = 60.0;
+const REFIT: f64 = 90.0;
 
 /// Two meshes whose boxes are kinetic, and the pairs of boxes that are apart.
 pub(super) struct KineticMeshes {
@@ -19,19 +25,32 @@ pub(super) struct KineticMeshes {
 
 impl KineticMeshes {
     /// Builds both trees, and compares them. The frames are the knots of the vertices' plans.
-    pub(super) fn new(
-        frames: &Frames,
-        others: Option<&Frames>,
-        still: Option<&Still>,
-    ) -> Result<Self, CliError> {
-        let other = match (others, still) {
-            (Some(others), _) => of_frames(others)?,
-            (None, Some(Still::Mesh(mesh))) => of_still(mesh).map_err(|cause| fault(&cause))?,
-            (None, Some(Still::Scan(_)) | None) => return Err(expected("no second mesh")),
+    pub(super) fn new(frames: &Frames, partner: Partner<'_>) -> Result<Self, CliError> {
+        let other = match partner {
+            Partner::Moving(others) => of_frames(others)?,
+            Partner::Still(Still::Mesh(mesh)) => of_still(mesh).map_err(|cause| fault(&cause))?,
+            Partner::Still(Still::Scan(_)) | Partner::Nothing => return Err(expected("no second mesh")),
         };
         let mut meshes = Self { trees: [of_frames(frames)?, other], list: SeparationList::new() };
         meshes.advance(0.0)?;
         Ok(meshes)
+    }
+
+    /// Returns the rate, in query times a second, from which kinetic trees take less time than
+    /// refitting. The events and certificates from the first file to the second are counted, those of
+    /// the knot between them included, and taken for those of every second.
+    pub(super) fn crossover(mut self) -> Result<f64, CliError> {
+        let certificates =
+            |meshes: &Self| meshes.trees.iter().map(|tree| tree.counts().certificates).sum::<u64>();
+        let (before, first) = (self.work(), certificates(&self));
+        self.advance(1.0)?;
+        let [_, events] = [0, 1].map(|k| self.work()[k] - before[k]);
+        #[expect(clippy::cast_precision_loss, reason = "an estimate")]
+        let kinetic = EVENT * events as f64 + CERTIFICATE * (certificates(&self) - first) as f64;
+        let nodes: usize = self.trees.iter().map(KineticTree::node_count).sum();
+        #[expect(clippy::cast_precision_loss, reason = "an estimate")]
+        let refit = REFIT * nodes.max(1) as f64;
+        Ok(kinetic / refit)
     }
 
     /// Moves both meshes to time `t`, and tests the triangles of leaves that meet.

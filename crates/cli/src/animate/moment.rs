@@ -21,7 +21,7 @@ struct AnimateReport {
 }
 
 /// One query time.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Moment {
     pub(super) t: f64,
     pub(super) bv_updates: u64,
@@ -73,7 +73,7 @@ impl Summary {
         self.queries.push(moment.query_micros as f32);
     }
 
-    pub(super) fn text(self) -> String {
+    pub(super) fn text(&self) -> String {
         let times = count(self.updates.len() as u64, "query time");
         let of = |word: &str| self.verdicts.iter().filter(|verdict| **verdict == word).count();
         let verdicts = ["intersecting", "separated", "undecided"];

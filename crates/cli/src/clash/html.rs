@@ -2,14 +2,11 @@
 
 use std::io::{self, Write};
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use nearmiss_draw::picture::Picture;
-
 use crate::clash::list::List;
 use crate::clash::pictures::Pictures;
 use crate::clash::table::{cells, sentence};
 use crate::digits::{grouped, short};
+use crate::html::{escaped, image};
 
 const STYLE: &str = "\
 body{font:15px/1.45 system-ui,sans-serif;color:#1e2228;max-width:1120px;margin:2em auto;padding:0 1em}
@@ -133,34 +130,6 @@ fn figures(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) -> io::Re
         )?;
     }
     writeln!(out, "</div>")
-}
-
-/// Embeds a picture in the page. `told`, escaped already, is its alternative text.
-fn image(picture: &Picture, told: &str, out: &mut impl Write) -> io::Result<()> {
-    let (width, height) = picture.size();
-    let mut png = Vec::new();
-    picture.encode(&mut png)?;
-    let data = STANDARD.encode(png);
-    writeln!(
-        out,
-        "<img width=\"{width}\" height=\"{height}\" alt=\"{told}\" src=\"data:image/png;base64,{data}\">"
-    )
-}
-
-/// Escapes text for HTML, also within quoted attributes.
-fn escaped(text: &str) -> String {
-    let mut html = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => html.push_str("&amp;"),
-            '<' => html.push_str("&lt;"),
-            '>' => html.push_str("&gt;"),
-            '"' => html.push_str("&quot;"),
-            '\'' => html.push_str("&#39;"),
-            letter => html.push(letter),
-        }
-    }
-    html
 }
 
 #[cfg(test)]

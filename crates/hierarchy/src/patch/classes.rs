@@ -61,7 +61,8 @@ pub(crate) fn vote_among(
             tree.nearest(level, block, VOTERS, &mut found);
             for i in of_block(block).filter(|&i| open(i)) {
                 let near = found.of(i % WIDTH).take(VOTERS).map(|n| n.id as usize);
-                if let Some(fit) = corrected(i, near, positions, radii, before) {
+                let known = (|i: usize| positions[i], |i: usize| radii[i], |i: usize| &before[i]);
+                if let Some(fit) = corrected(i, near, &known) {
                     changed.push((id32(i), fit));
                 }
             }
@@ -79,27 +80,26 @@ fn agree(n: [f32; 3], m: [f32; 3]) -> bool {
     dot(n, m).abs() >= AGREEING
 }
 
-/// Returns the fit of point `i` after the vote of its neighbours, if it changes.
-fn corrected(
-    i: usize,
-    near: impl Iterator<Item = usize>,
-    positions: &[[f32; 3]],
-    radii: &[f32],
-    fits: &[Fit],
+/// Returns the fit of point `i` after the vote of its neighbours, the nearest first, if it changes.
+/// The functions return the position, the radius and the fit of a point.
+pub(crate) fn corrected<'a, I: Copy>(
+    i: I,
+    near: impl Iterator<Item = I>,
+    (position, radius, fit): &(impl Fn(I) -> [f32; 3], impl Fn(I) -> f32, impl Fn(I) -> &'a Fit),
 ) -> Option<Fit> {
-    let sheets = near.filter(|&j| fits[j].kind().is_sheet());
-    match fits[i].kind() {
+    let sheets = near.filter(|&j| fit(j).kind().is_sheet());
+    match fit(i).kind() {
         PointKind::Noisy => {
-            let height = |j: usize| dot(fits[j].normal, sub(positions[i], positions[j])).abs();
-            let mut for_sheet = sheets.filter(|&j| height(j) <= SLAB * radii[i].min(radii[j]));
+            let height = |j: I| dot(fit(j).normal, sub(position(i), position(j))).abs();
+            let mut for_sheet = sheets.filter(|&j| height(j) <= SLAB * radius(i).min(radius(j)));
             // The nearest comes first.
-            let normal = fits[for_sheet.next()?].normal;
-            let agreeing = 1 + for_sheet.filter(|&j| agree(normal, fits[j].normal)).count();
+            let normal = fit(for_sheet.next()?).normal;
+            let agreeing = 1 + for_sheet.filter(|&j| agree(normal, fit(j).normal)).count();
             (agreeing >= MAJORITY).then_some(Fit::new(normal, PointKind::Sheet))
         }
         PointKind::Sheet | PointKind::Edge => {
-            let agreeing = sheets.filter(|&j| agree(fits[i].normal, fits[j].normal)).count();
-            (agreeing < ALONE).then_some(Fit::new(fits[i].normal, PointKind::Noisy))
+            let agreeing = sheets.filter(|&j| agree(fit(i).normal, fit(j).normal)).count();
+            (agreeing < ALONE).then_some(Fit::new(fit(i).normal, PointKind::Noisy))
         }
         _ => None,
     }
@@ -110,40 +110,42 @@ fn corrected(
 /// noisy points if there are enough, then of points at edges, then of others, and of each kind the
 /// last ones are moved. Returns `None` if no point is sparse.
 pub(crate) fn dense_first(
-    positions: &[[f32; 3]],
-    fits: &[Fit],
+    count: usize,
+    (position, kind): (impl Fn(usize) -> [f32; 3], impl Fn(usize) -> PointKind),
     leaf_size: usize,
     work: &Workspace,
 ) -> Result<Option<(Room<Item>, usize)>, WorkError> {
     const DENSE: [PointKind; 3] = [PointKind::Noisy, PointKind::Edge, PointKind::Sheet];
     let mut counts = [0; DENSE.len()];
-    for fit in fits {
-        if let Some(k) = DENSE.iter().position(|&kind| kind == fit.kind()) {
+    for i in 0..count {
+        let kind = kind(i);
+        if let Some(k) = DENSE.iter().position(|&dense| dense == kind) {
             counts[k] += 1;
         }
     }
     let all: usize = counts.iter().sum();
-    if all == fits.len() {
+    if all == count {
         return Ok(None);
     }
     let mut over = all % leaf_size;
     let dense = all - over;
     // Of each kind, the first `count` stay.
-    for count in &mut counts {
-        let left = over.min(*count);
-        (over, *count) = (over - left, *count - left);
+    for kept in &mut counts {
+        let left = over.min(*kept);
+        (over, *kept) = (over - left, *kept - left);
     }
-    let mut room = work.room(fits.len())?;
+    let mut room = work.room(count)?;
     let items: &mut [Item] = &mut room;
     let mut next = [0, dense];
-    for (i, fit) in fits.iter().enumerate() {
-        let stays = DENSE.iter().position(|&kind| kind == fit.kind()).is_some_and(|k| {
+    for i in 0..count {
+        let kind = kind(i);
+        let stays = DENSE.iter().position(|&dense| dense == kind).is_some_and(|k| {
             let is_first = counts[k] > 0;
             counts[k] -= usize::from(is_first);
             is_first
         });
         let place = &mut next[usize::from(!stays)];
-        items[*place] = Item { position: positions[i], index: id32(i) };
+        items[*place] = Item { position: position(i), index: id32(i) };
         *place += 1;
     }
     Ok(Some((room, dense)))
@@ -169,7 +171,9 @@ mod tests {
             fits.extend([fit(aside, PointKind::Sheet); 2]);
             fits
         };
-        let corrected = |fits: &[Fit]| corrected(0, 1..9, &positions, &radii, fits);
+        let corrected = |fits: &[Fit]| {
+            corrected(0, 1..9, &(|i: usize| positions[i], |i: usize| radii[i], |i: usize| &fits[i]))
+        };
         assert!(
             corrected(&kinds(2)).is_none(),
             "two of the floor and two of the wall are not four of one sheet"

@@ -15,9 +15,10 @@ use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::change_both;
+use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
 
-use crate::bounds::boxes::OrientedBox;
+use crate::bounds::boxes::{OrientedBox, ROUNDING};
 use crate::bounds::growth::Growth;
 use crate::point::disc::DiscRadii;
 use crate::point::kind::{SLAB, THICKNESS, ball, cell_radius, is_on_sheet, obstacle_ball};
@@ -79,18 +80,23 @@ impl Parts<'_> {
     }
 }
 
-/// Replaces the box of each node by the smallest one along its axes about the discs and balls of the
-/// node's points, with their greatest radius, and sets its growths to the enclosures of the surface
-/// and of the obstacle. The surface is within `beyond` of the points. O(n log n).
+/// Replaces the box of each node by one along its axes about the discs and balls of the node's
+/// points, with their greatest radius, and sets its growths to the enclosures of the surface and of
+/// the obstacle. The surface is within `beyond` of the points. O(n).
+///
+/// The box of a node with at most four leaves is the smallest one. That of any other node is the
+/// smallest one about the boxes of the nodes with four leaves under it, which are small beside it.
 pub(crate) fn bound_parts(
     topology: &Topology,
     (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]]),
     (points, parts): (&[PointBlock], &[PartBlock]),
     beyond: f32,
 ) {
-    let (level, beyond) = (Level::new(), beyond * GROWN);
-    change_both(boxes, growths, AT_ONCE, |id, bounds, growths| {
-        let range = topology.points(NodeId(id32(id)));
+    let (level, beyond, small) = (Level::new(), beyond * GROWN, topology.first_bottom());
+    let (large_boxes, boxes) = boxes.split_at_mut(small);
+    let (large_growths, growths) = growths.split_at_mut(small);
+    change_both(boxes, growths, AT_ONCE, |number, bounds, growths| {
+        let range = topology.points(NodeId(id32(small + number)));
         let Extents { discs, cells, points, reach } = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || extents(simd, (points, parts), range, &bounds.axes),
@@ -99,6 +105,49 @@ pub(crate) fn bound_parts(
         let surface = [points[0].map(|x| x - beyond), points[1].map(|x| x + beyond)];
         *growths = [surface, cells].map(|[low, high]| Growth::new(bounds, low, high));
     });
+    let (boxes, growths): (&[_], &[_]) = (boxes, growths);
+    change_both(large_boxes, large_growths, 1, |id, bounds, of_node| {
+        let below = topology.bottoms_under(NodeId(id32(id)));
+        let below = below.start - small..below.end - small;
+        (*bounds, *of_node) = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || about(&bounds.axes, (&boxes[below.clone()], &growths[below])),
+        ));
+    });
+}
+
+/// Returns the smallest box along some axes about some boxes, and its growths to the smallest
+/// enclosures about theirs.
+#[inline(always)]
+fn about(
+    axes: &[[f32; 3]; 3],
+    (boxes, growths): (&[OrientedBox], &[[Growth; 2]]),
+) -> (OrientedBox, [Growth; 2]) {
+    let mut spans = [[[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]; 3];
+    let mut reach = 0.0_f32;
+    for (bounds, growths) in boxes.iter().zip(growths) {
+        reach = reach.max(bounds.reach);
+        let solids = [*bounds, growths[0].of(bounds), growths[1].of(bounds)];
+        for (span, solid) in spans.iter_mut().zip(solids) {
+            for k in 0..3 {
+                let [u, v, w] = solid.axes;
+                let [x, y, z] = solid.half;
+                let middle = dot(axes[k], solid.centre);
+                let spread =
+                    x * dot(axes[k], u).abs() + y * dot(axes[k], v).abs() + z * dot(axes[k], w).abs();
+                span[0][k] = span[0][k].min(middle - spread);
+                span[1][k] = span[1][k].max(middle + spread);
+            }
+        }
+    }
+    // The boxes are rounded once more than points.
+    for [low, high] in &mut spans {
+        let far = (0..3).fold(0.0_f32, |far, k| far.max(low[k].abs()).max(high[k].abs()));
+        (*low, *high) = (low.map(|x| x - ROUNDING * far), high.map(|x| x + ROUNDING * far));
+    }
+    let [discs, surface, obstacle] = spans;
+    let bounds = OrientedBox::spanned(*axes, discs[0], discs[1], reach);
+    (bounds, [surface, obstacle].map(|[low, high]| Growth::new(&bounds, low, high)))
 }
 
 /// The least and greatest coordinates of some points along three axes.

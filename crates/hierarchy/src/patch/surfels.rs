@@ -43,6 +43,12 @@ pub(crate) struct Fit {
     code: u32,
 }
 
+impl Default for Fit {
+    fn default() -> Self {
+        Self::new([0.0, 0.0, 1.0], PointKind::Stray)
+    }
+}
+
 impl Fit {
     pub(crate) fn new(normal: [f32; 3], kind: PointKind) -> Self {
         Self { normal, code: kind.code().into() }
@@ -337,7 +343,7 @@ impl Leaf<'_> {
                         let block = &index.blocks[locality.blocks[place as usize] as usize];
                         let d = seen_from(simd, &block.position, *p);
                         let (d_sq, flat) = (product(d, d), [along(d, axes.0), along(d, axes.1)]);
-                        taken.add(simd, block, d_sq, flat);
+                        taken.add(simd, f32x16::load_array_ref(simd, &block.support_radius), d_sq, flat);
                         sides.add(simd, &cell, d_sq, flat, along(d, fit.normal));
                     }
                     sides.close(&mut cell);
@@ -390,24 +396,31 @@ fn widest_gap<'a, S: Simd>(
     let (axes, mut taken) = (tangents(normal), Taken::new(simd));
     for block in near {
         let d = seen_from(simd, &block.position, p);
-        taken.add(simd, block, product(d, d), [along(d, axes.0), along(d, axes.1)]);
+        let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
+        taken.add(simd, support_radius, product(d, d), [along(d, axes.0), along(d, axes.1)]);
     }
     taken.widest_gap()
 }
 
 /// The sectors of the tangent plane of a point with points that support it, as bits, in lanes.
-struct Taken<S: Simd>(i32x16<S>);
+pub(crate) struct Taken<S: Simd>(i32x16<S>);
 
 impl<S: Simd> Taken<S> {
     #[inline(always)]
-    fn new(simd: S) -> Self {
+    pub(crate) fn new(simd: S) -> Self {
         Self(i32x16::splat(simd, 0))
     }
 
-    /// Adds the points of a block that have the point within their support radius. `d_sq` are their
+    /// Adds those of sixteen points that have the point within their support radius. `d_sq` are their
     /// squared distances from it, `x` and `y` their coordinates in its tangent plane.
     #[inline(always)]
-    fn add(&mut self, simd: S, block: &PointBlock, d_sq: f32x16<S>, [x, y]: [f32x16<S>; 2]) {
+    pub(crate) fn add(
+        &mut self,
+        simd: S,
+        support_radius: f32x16<S>,
+        d_sq: f32x16<S>,
+        [x, y]: [f32x16<S>; 2],
+    ) {
         let length = x.abs() + y.abs();
         // The angle on the diamond |x| + |y| = 1, from 0 to 4, one for each quarter turn, without
         // trigonometry.
@@ -415,7 +428,6 @@ impl<S: Simd> Taken<S> {
         let quarter = simd.select_f32x16(y.simd_ge(0.0), -(share - 1.0), share + 3.0);
         let turn = quarter * (SECTORS as f32 / 4.0);
         let sector = simd.select_f32x16(turn.simd_lt(SECTORS as f32), turn, f32x16::splat(simd, 0.0));
-        let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
         let counts: mask32x16<S> = d_sq.simd_lt(support_radius * support_radius) & length.simd_gt(0.0);
         self.0 |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
     }
@@ -423,17 +435,29 @@ impl<S: Simd> Taken<S> {
     /// Returns the greatest number of adjacent sectors without a point.
     #[inline(always)]
     fn widest_gap(self) -> u32 {
-        let taken = self.0.to_array().into_iter().fold(0, |all, bits| all | u64::from(bits.cast_unsigned()));
-        // Repeated, so that a run across the start counts whole.
-        let round = taken | taken << SECTORS;
-        // After k steps a bit remains for each run longer than k.
-        let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
-        while runs != 0 {
-            runs &= runs >> 1;
-            widest += 1;
-        }
-        widest.min(SECTORS)
+        widest_gap_beside(self.0.to_array().into_iter().fold(0, |all, bits| all | bits))
     }
+
+    /// Returns the same for each lane alone, where each has a point of its own.
+    #[inline(always)]
+    pub(crate) fn gaps(self) -> [u32; 16] {
+        self.0.to_array().map(widest_gap_beside)
+    }
+}
+
+/// Returns the greatest number of adjacent sectors beside those `taken`.
+#[inline(always)]
+fn widest_gap_beside(taken: i32) -> u32 {
+    let taken = u64::from(taken.cast_unsigned());
+    // Repeated, so that a run across the start counts whole.
+    let round = taken | taken << SECTORS;
+    // After k steps a bit remains for each run longer than k.
+    let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
+    while runs != 0 {
+        runs &= runs >> 1;
+        widest += 1;
+    }
+    widest.min(SECTORS)
 }
 
 /// Returns the bit of each number from 0 to 30, rounded down: the power of two, made as a

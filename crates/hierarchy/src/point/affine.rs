@@ -33,6 +33,7 @@ pub(crate) struct Motion {
     pub(crate) is_carried: bool,
 }
 
+#[inline(always)]
 fn middle(points: &[[f32; 3]]) -> [f32; 3] {
     // Relative to the first point, where rounding is least.
     let (first, mut sum) = (points[0], [0.0_f32; 3]);
@@ -42,7 +43,7 @@ fn middle(points: &[[f32; 3]]) -> [f32; 3] {
     }
     #[expect(clippy::cast_precision_loss, reason = "at most 64")]
     let count = points.len() as f32;
-    [0, 1, 2].map(|k| first[k] + sum[k] / count)
+    [first[0] + sum[0] / count, first[1] + sum[1] / count, first[2] + sum[2] / count]
 }
 
 impl Rest {
@@ -77,6 +78,7 @@ impl Rest {
 
     /// Fits the motion from `points`, at rest, to the places `now`. A carried leaf stretches by at
     /// most `most` or its reciprocal, and each point is within `off` of its radius of its place.
+    #[inline(always)]
     pub(crate) fn motion(
         &self,
         points: &[[f32; 3]],
@@ -96,8 +98,14 @@ impl Rest {
             }
         }
         let [a, b, c, d, e, f] = self.inverse;
-        let linear = rows.map(|row| [dot(row, [a, b, c]), dot(row, [b, d, e]), dot(row, [c, e, f])]);
-        let apply = |v: [f32; 3]| linear.map(|row| dot(row, v));
+        let mut linear = rows;
+        for i in 0..3 {
+            linear[i] = [dot(rows[i], [a, b, c]), dot(rows[i], [b, d, e]), dot(rows[i], [c, e, f])];
+        }
+        let [x, y, z] = linear;
+        // Functions and arrays instead of `map`: closures within `map` are compiled without the
+        // instruction set of their caller.
+        let apply = |v: [f32; 3]| [dot(x, v), dot(y, v), dot(z, v)];
         let (u, v) = tangents(self.normal);
         let (u, v) = (apply(u), apply(v));
         let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
@@ -128,7 +136,8 @@ impl Motion {
         let [x, y, z] = &self.cofactors;
         let m = [0, 1, 2].map(|k| n[0] * x[k] + n[1] * y[k] + n[2] * z[k]);
         let length = dot(m, m).sqrt();
-        if length > f32::MIN_POSITIVE && length.is_finite() { m.map(|c| c / length) } else { n }
+        let scale = 1.0 / length;
+        if length > f32::MIN_POSITIVE && length.is_finite() { m.map(|c| c * scale) } else { n }
     }
 }
 

@@ -3,8 +3,8 @@
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, i16x16};
-use nearmiss_lanes::parallel::fill;
+use fearless_simd::{Level, Simd, dispatch, f32x16, i16x16};
+use nearmiss_lanes::parallel::{change_each, fill};
 use nearmiss_lanes::vector::sub;
 
 use crate::bounds::boxes::OrientedBox;
@@ -63,17 +63,19 @@ impl LeafBlock {
     ///
     /// # Panics
     /// If there is no such lane.
-    #[expect(clippy::cast_possible_truncation, reason = "a cast of floats keeps within the range")]
     pub fn set(&mut self, lane: usize, position: [f32; 3], normal: [f32; 3], disc: f32) {
-        let nearest = |x: f32| (x + 0.5_f32.copysign(x)) as i16;
-        let per_step = if self.step > 0.0 { 1.0 / self.step } else { 0.0 };
-        let steps = |x: f32| nearest(x * per_step);
-        let offset = sub(position, self.centre).map(steps);
-        self.discs[lane] = steps(disc);
+        let scale = self.steps_per_length();
+        let offset = sub(position, self.centre);
+        self.discs[lane] = nearest(disc * scale);
         for k in 0..3 {
-            self.positions[k][lane] = offset[k];
+            self.positions[k][lane] = nearest(offset[k] * scale);
             self.normals[k][lane] = nearest(normal[k] * STEPS);
         }
+    }
+
+    #[inline(always)]
+    fn steps_per_length(&self) -> f32 {
+        if self.step > 0.0 { 1.0 / self.step } else { 0.0 }
     }
 
     /// Returns the position in a lane.
@@ -127,6 +129,23 @@ impl LeafBlock {
     }
 }
 
+/// Returns the nearest integer.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a cast of floats keeps within the range")]
+fn nearest(x: f32) -> i16 {
+    (x + 0.5_f32.copysign(x)) as i16
+}
+
+/// Returns numbers times `scale`, each rounded to the nearest integer.
+#[inline(always)]
+fn in_steps(numbers: &[f32; WIDTH], scale: f32) -> [i16; WIDTH] {
+    let mut steps = [0; WIDTH];
+    for lane in 0..WIDTH {
+        steps[lane] = nearest(numbers[lane] * scale);
+    }
+    steps
+}
+
 #[inline(always)]
 fn steps<S: Simd>(simd: S, steps: &[i16; WIDTH]) -> f32x16<S> {
     let (low, high) = i16x16::load_array_ref(simd, steps).widen();
@@ -169,20 +188,40 @@ impl LeafParts<'_> {
         bounds: impl Fn(usize) -> OrientedBox + Sync + Send,
         (blocks, marks): (&mut [LeafBlock], &mut [u8]),
     ) {
-        let blocks_a_leaf = Self::blocks_a_leaf(topology);
-        fill(blocks, |number| self.block(topology, number, &bounds(number / blocks_a_leaf)));
+        let (blocks_a_leaf, level) = (Self::blocks_a_leaf(topology), Level::new());
+        change_each(blocks, WIDTH, |number, block| {
+            let bounds = bounds(number / blocks_a_leaf);
+            *block = dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || self.block(topology, number, &bounds),
+            ));
+        });
         fill(marks, |leaf| self.marks(topology, leaf, &bounds(leaf)));
     }
 
     /// Returns block `number`, counted over all leaves. `bounds` is the box of its leaf.
+    #[inline(always)]
     pub(crate) fn block(&self, topology: &Topology, number: usize, bounds: &OrientedBox) -> LeafBlock {
         let blocks_a_leaf = Self::blocks_a_leaf(topology);
         let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
-        let mut block = LeafBlock::new(bounds);
         let points = topology.points_of_leaf(leaf);
-        for (lane, i) in points.skip(part * WIDTH).take(WIDTH).enumerate() {
-            block.set(lane, self.positions[i], self.normals[i], self.discs.get(i));
+        let points = points.start + part * WIDTH..points.end.min(points.start + (part + 1) * WIDTH);
+        let (mut positions, mut normals) = ([[0.0; WIDTH]; 3], [[0.0; WIDTH]; 3]);
+        let mut discs = [0.0; WIDTH];
+        for (lane, i) in points.clone().enumerate() {
+            let (offset, normal) = (sub(self.positions[i], bounds.centre), self.normals[i]);
+            for k in 0..3 {
+                (positions[k][lane], normals[k][lane]) = (offset[k], normal[k]);
+            }
+            discs[lane] = self.discs.get(i);
         }
+        let mut block = LeafBlock::new(bounds);
+        let scale = block.steps_per_length();
+        for k in 0..3 {
+            block.positions[k] = in_steps(&positions[k], scale);
+            block.normals[k] = in_steps(&normals[k], STEPS);
+        }
+        block.discs = in_steps(&discs, scale);
         block
     }
 

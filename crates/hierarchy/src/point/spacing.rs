@@ -32,7 +32,7 @@ const MOST_NEIGHBOURS: usize = 256;
 const LINE: f64 = 0.05;
 
 /// The maximum growth of radii per distance. With 0.3 they can double over about three spacings.
-const GROWTH: f32 = 0.3;
+pub(crate) const GROWTH: f32 = 0.3;
 
 /// The spacing of a point, and the appearance of its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]

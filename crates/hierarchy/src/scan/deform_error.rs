@@ -1,6 +1,7 @@
 //! Why new positions cannot replace those of a deforming mesh or scan.
 
 use nearmiss_geometry::{Aabb, CloudError};
+use nearmiss_lanes::parallel::both;
 use thiserror::Error;
 
 use crate::scan::options::BuildError;
@@ -39,6 +40,16 @@ pub enum DeformError {
         /// The greatest coordinate.
         got: f64,
     },
+    /// A depth frame whose number of points is not that of some rows of pixels.
+    #[error(
+        "expected {width} points in each row of pixels, got {got} points in all; give one for each pixel, NaN for holes"
+    )]
+    Image {
+        /// The number of pixels in a row.
+        width: usize,
+        /// The number of points.
+        got: usize,
+    },
     /// Points that were repeated in the first frame are not any longer.
     #[error(
         "expected point {index} to stay with point {twin}, with which it coincided in the first frame, \
@@ -75,11 +86,7 @@ pub enum DeformError {
 /// Returns the bounds of positions, all of which must be finite. `what` names one of them.
 pub(crate) fn bounds_of(what: &'static str, positions: &[[f64; 3]]) -> Result<Aabb, DeformError> {
     // NaN and infinities survive in the sum, so that one pass decides in almost all cases.
-    let (mut bounds, mut sum) = (Aabb::EMPTY, 0.0_f64);
-    for p in positions {
-        bounds.grow(*p);
-        sum += 0.0 * (p[0] + p[1] + p[2]);
-    }
+    let (bounds, sum) = bounds_and_sum(positions);
     if sum.is_finite() {
         return Ok(bounds);
     }
@@ -89,4 +96,25 @@ pub(crate) fn bounds_of(what: &'static str, positions: &[[f64; 3]]) -> Result<Aa
         // Finite coordinates whose sum overflows.
         None => Ok(bounds),
     }
+}
+
+/// Returns the bounds of positions, and a sum that is finite if all of them are.
+fn bounds_and_sum(positions: &[[f64; 3]]) -> (Aabb, f64) {
+    const TASK: usize = 1 << 14;
+    if positions.len() > TASK {
+        let (left, right) = positions.split_at(positions.len() / 2);
+        let ((mut bounds, sum), (other, more)) = both(|| bounds_and_sum(left), || bounds_and_sum(right));
+        bounds.grow(other.min);
+        bounds.grow(other.max);
+        return (bounds, sum + more);
+    }
+    let (mut low, mut high, mut sum) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], 0.0);
+    for p in positions {
+        for k in 0..3 {
+            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+        }
+        sum += 0.0 * (p[0] + p[1] + p[2]);
+    }
+    (Aabb { min: low, max: high }, sum)
 }

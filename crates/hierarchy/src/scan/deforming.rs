@@ -3,16 +3,17 @@
 use std::ops::Deref;
 
 use nearmiss_geometry::{Aabb, Frame, PointCloud};
-use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::parallel::{map_all, on_threads};
 use nearmiss_store::Workspace;
 use nearmiss_surface::Metric;
 
-use crate::scan::build::{PointHierarchy, assembled};
+use crate::scan::anew::fitted_anew;
+use crate::scan::build::PointHierarchy;
 use crate::scan::deform_error::{DeformError, bounds_of};
-use crate::scan::options::BuildOptions;
+use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::ordered::Ordered;
+use crate::scan::organised::{Pixels, replace_organised};
 use crate::scan::points::ScanPoints;
-use crate::scan::prepare::finish;
 use crate::scan::refit::{Memory, NextFrame, Refitted, refit};
 
 /// The greatest coordinate in units of the stored frame: beyond it, squares of squares of lengths
@@ -50,6 +51,8 @@ pub struct DeformingScan {
     /// Points that were repeated in the first frame, with those that represent them.
     twins: Vec<[u32; 2]>,
     memory: Memory,
+    /// The memory of depth frames.
+    pixels: Pixels,
     /// The cost of the boxes when all points were fitted anew.
     fresh: f64,
 }
@@ -98,9 +101,21 @@ impl DeformingScan {
     }
 
     fn with(scan: PointHierarchy, options: BuildOptions, given: usize, twins: Vec<[u32; 2]>) -> Self {
-        let memory = Memory::at_rest(&scan);
+        let memory = Memory::at_rest();
         let fresh = cost(&scan);
-        Self { scan, options, given, twins, memory, fresh }
+        Self { scan, options, given, twins, memory, pixels: Pixels::default(), fresh }
+    }
+
+    /// Takes another scan as the first frame, whose points have just been fitted. Keeps the memory.
+    fn become_scan(&mut self, scan: PointHierarchy, given: usize, twins: Vec<[u32; 2]>) {
+        (self.scan, self.given, self.twins) = (scan, given, twins);
+        self.settle();
+    }
+
+    /// Notes that all points have just been fitted.
+    fn settle(&mut self) {
+        self.memory.refresh();
+        self.fresh = cost(&self.scan);
     }
 
     /// Moves the points, given in the order of the first frame. O(n log n) on all cores; does not
@@ -122,8 +137,9 @@ impl DeformingScan {
         Ok(refit(&mut self.scan, &mut self.memory, &placed))
     }
 
-    /// Moves the points and fits everything anew, radii, classes and reach included. The order of
-    /// the points and the nodes stay; so does which points count as dense.
+    /// Moves the points and fits all of them anew: radii, normals, classes and reach. The order of the
+    /// points and the nodes stay; so does which points count as dense. Enclosures, neighbour lists and
+    /// coverings are as after [`Self::refit`].
     ///
     /// # Errors
     /// As [`Self::refit`], and if the frame cannot be prepared with the options of the first one.
@@ -141,7 +157,7 @@ impl DeformingScan {
         };
         let work = Workspace::in_memory();
         let ordered = Ordered::kept(&in_order, self.scan.meta.dense as usize, &self.options, &work)?;
-        let mut scan = assembled(finish(&in_order, ordered, &self.options, &work)?, &work)?;
+        let mut scan = fitted_anew(&in_order, ordered, &self.options, &mut self.memory.closing)?;
         if self.scan.is_oriented() {
             refit(
                 &mut self.scan,
@@ -150,7 +166,8 @@ impl DeformingScan {
             );
             scan.turn_normals(self.scan.normals());
         }
-        *self = Self::with(scan, self.options, self.given, std::mem::take(&mut self.twins));
+        let twins = std::mem::take(&mut self.twins);
+        self.become_scan(scan, self.given, twins);
         Ok(())
     }
 
@@ -164,17 +181,53 @@ impl DeformingScan {
         Ok(())
     }
 
-    /// Replaces the scan by another one of other points, prepared with the same options. Points that
-    /// are not finite, such as the holes of a depth frame, are dropped. Costs as much as
-    /// [`Self::new`].
+    /// Replaces the scan by another one of other points, with the same options. Points that are not
+    /// finite, such as the holes of a depth frame, are dropped. The tree is new; enclosures, neighbour
+    /// lists and coverings are as after [`Self::refit`], and [`Self::rebuild`] prepares those too.
     ///
     /// # Errors
     /// As [`Self::new`]. The scan is unchanged then.
     pub fn replace(&mut self, points: &[[f64; 3]]) -> Result<(), DeformError> {
         let cloud = PointCloud::cleaned(points)?;
         let twins = if cloud.dropped().duplicate > 0 { twins(&cloud, points) } else { Vec::new() };
-        let scan = PointHierarchy::build(&cloud, &self.options)?;
-        *self = Self::with(scan, self.options, points.len(), twins);
+        let (options, closing) = (self.options, &mut self.memory.closing);
+        options.check()?;
+        let scan = on_threads(options.threads, || {
+            let (points, work) = ((&cloud).into(), Workspace::in_memory());
+            fitted_anew(&points, Ordered::of(&points, &options, &work)?, &options, closing)
+        })
+        .or(Err(BuildError::Threads(options.threads)))??;
+        self.become_scan(scan, points.len(), twins);
+        Ok(())
+    }
+
+    /// Replaces the scan by a depth frame: `points` has a place for each pixel, row by row, `width` in
+    /// each. Pixels that are not finite or zero, where nothing was measured, are dropped.
+    ///
+    /// Neighbours are sought among the pixels around each point, and the order of the points follows a
+    /// curve through the image. So this takes a small part of the time of [`Self::replace`]. Local
+    /// radii are distances of neighbours within two pixels, and normals and classes are fitted to
+    /// those within three. Bounds follow from these as after [`Self::refit`]. If one of twenty points
+    /// has too few neighbours there, the result is that of [`Self::replace`].
+    ///
+    /// # Errors
+    /// If the number of points is not a multiple of `width`, and as [`Self::new`]. The scan is
+    /// unchanged then.
+    pub fn replace_organised(&mut self, points: &[[f64; 3]], width: usize) -> Result<(), DeformError> {
+        if width == 0 || !points.len().is_multiple_of(width) || u32::try_from(points.len()).is_err() {
+            return Err(DeformError::Image { width, got: points.len() });
+        }
+        let Self { scan, options, memory, pixels, .. } = self;
+        options.check()?;
+        let replaced = on_threads(options.threads, || {
+            replace_organised(scan, pixels, &mut memory.closing, (points, width), options)
+        });
+        if !replaced.or(Err(BuildError::Threads(options.threads)))?? {
+            let hole = |p: &[f64; 3]| if *p == [0.0; 3] { [f64::NAN; 3] } else { *p };
+            return self.replace(&map_all(points, hole));
+        }
+        (self.given, self.twins) = (points.len(), Vec::new());
+        self.settle();
         Ok(())
     }
 
@@ -240,7 +293,7 @@ fn cost(scan: &PointHierarchy) -> f64 {
 }
 
 /// Returns a bound of the change of a coordinate by rounding to single precision.
-fn step(frame: &Frame, bounds: &Aabb) -> f64 {
+pub(crate) fn step(frame: &Frame, bounds: &Aabb) -> f64 {
     let far = |k: usize| (bounds.min[k] - frame.origin[k]).abs().max((bounds.max[k] - frame.origin[k]).abs());
     0.5 * f64::from(f32::EPSILON) * (0..3).map(far).fold(0.0, f64::max)
 }

@@ -114,7 +114,8 @@ impl Ordered {
         let mut ordered =
             Self::classified(topology, boxes, (positions, source), (options, unit, count), work)?;
         let Self { boxes, positions, source, radii, fits, blocks, plan, summary, .. } = &mut ordered;
-        if let Some((mut items, before)) = dense_first(positions, fits, options.leaf_size as usize, work)? {
+        let known = (|i: usize| positions[i], |i: usize| fits[i].kind());
+        if let Some((mut items, before)) = dense_first(count, known, options.leaf_size as usize, work)? {
             summary.dense = before;
             split(&mut items, &topology, before, boxes);
             let items: &[Item] = &items;

@@ -135,7 +135,8 @@ fn bounds(
     })
 }
 
-fn about(
+/// Returns the metadata of a scan, without its outline.
+pub(crate) fn about(
     points: &ScanPoints<'_>,
     options: &BuildOptions,
     surface: SurfaceOptions,

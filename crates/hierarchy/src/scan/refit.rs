@@ -1,30 +1,18 @@
-//! Moves the points of a prepared scan: carries discs along, fits some anew, and bounds all nodes.
+//! Moves the points of a prepared scan: carries discs along, and fits some anew.
 
-use nearmiss_geometry::{Aabb, Frame, NodeId};
+use fearless_simd::{Level, Simd, dispatch};
+use nearmiss_geometry::{Aabb, Frame};
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{change_each, fill};
 use nearmiss_lanes::vector::dot;
-use nearmiss_store::Array;
-use nearmiss_surface::SurfacePlan;
 
-use crate::bounds::boxes::OrientedBox;
-use crate::bounds::growth::Growth;
 use crate::patch::classes::vote_among;
-use crate::patch::covering::Covering;
-use crate::patch::parts::{PartBlock, Parts, bound_parts};
 use crate::patch::surfels::{Fit, align, codes_of, fits_of};
 use crate::point::affine::{Motion, Rest};
-use crate::point::disc::DiscRadii;
-use crate::point::gather::NeighbourList;
-use crate::point::leaf_block::LeafParts;
-use crate::point::neighbours::fill_groups;
 use crate::point::spacing::{Look, spacings_of};
 use crate::scan::build::PointHierarchy;
-use crate::scan::sampling::{quantile, set_reaches};
-use crate::tree::split::{Item, bound_in_order};
-use crate::tree::topology::Topology;
-use crate::tree::wide::{Root, growths_of_siblings, siblings};
+use crate::scan::closing::Closing;
 
 /// The greatest change of lengths in the tangent planes of a leaf, as a factor or its reciprocal, for
 /// which its discs are carried along.
@@ -36,7 +24,7 @@ const STRETCH: f32 = 1.25;
 const OFF: f32 = 0.2;
 
 /// The least local radius: its square is a normal number in single precision.
-const LEAST_RADIUS: f32 = 1e-18;
+pub(crate) const LEAST_RADIUS: f32 = 1e-18;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
@@ -58,45 +46,52 @@ pub(crate) struct NextFrame<'a> {
 }
 
 /// The points as they were when last fitted, and reused memory.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Memory {
+    /// `true` if the scan is as it was when last fitted, and the state at rest below is not up to
+    /// date.
+    is_fresh: bool,
     positions: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
     radii: Vec<f32>,
     leaves: Vec<Rest>,
     motions: Vec<Motion>,
-    items: Vec<Item>,
-    parts: Vec<PartBlock>,
-    boxes: Vec<OrientedBox>,
-    growths: Vec<[Growth; 2]>,
     /// The leaves to fit anew.
     changed: Vec<u32>,
-    counts: Vec<usize>,
+    pub(crate) closing: Closing,
 }
 
 impl Memory {
     /// The memory of a scan whose points have just been fitted.
-    pub(crate) fn at_rest(scan: &PointHierarchy) -> Self {
+    pub(crate) fn at_rest() -> Self {
+        Self { is_fresh: true, ..Self::default() }
+    }
+
+    /// Notes that all points have just been fitted.
+    pub(crate) const fn refresh(&mut self) {
+        self.is_fresh = true;
+    }
+
+    /// Takes the scan for its state at rest if it has just been fitted.
+    fn settle(&mut self, scan: &PointHierarchy) {
+        if !std::mem::take(&mut self.is_fresh) {
+            return;
+        }
         let topology = scan.topology();
-        let mut memory = Self {
-            positions: scan.positions().to_vec(),
-            normals: scan.normals().to_vec(),
-            radii: scan.radii().to_vec(),
-            leaves: vec![Rest::default(); topology.leaves()],
-            motions: vec![Motion::default(); topology.leaves()],
-            items: vec![Item { position: [0.0; 3], index: 0 }; scan.len()],
-            parts: vec![bytemuck::Zeroable::zeroed(); scan.blocks().len()],
-            boxes: vec![OrientedBox::default(); topology.len()],
-            growths: vec![[Growth::default(); 2]; topology.len()],
-            changed: Vec::with_capacity(topology.leaves()),
-            counts: Vec::new(),
-        };
-        let Self { positions, normals, leaves, .. } = &mut memory;
+        self.positions.clear();
+        self.positions.extend_from_slice(scan.positions());
+        self.normals.clear();
+        self.normals.extend_from_slice(scan.normals());
+        self.radii.clear();
+        self.radii.extend_from_slice(scan.radii());
+        self.leaves.resize(topology.leaves(), Rest::default());
+        self.motions.resize(topology.leaves(), Motion::default());
+        self.closing.reserve(scan);
+        let Self { positions, normals, leaves, .. } = self;
         fill(leaves, |leaf| {
             let points = topology.points_of_leaf(leaf);
             Rest::new(&positions[points.clone()], &normals[points])
         });
-        memory
     }
 
     /// Takes a leaf as it is in `scan` for its state at rest.
@@ -112,7 +107,8 @@ impl Memory {
 
 /// Moves the points of `scan`.
 pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>) -> Refitted {
-    place(scan, memory, placed);
+    memory.settle(scan);
+    place(scan, placed);
     carry(scan, memory);
     let topology = scan.topology;
     memory.changed.clear();
@@ -120,39 +116,32 @@ pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &Nex
     memory.changed.extend((0..topology.leaves()).filter(is_changed).map(id32));
     let changed = std::mem::take(&mut memory.changed);
     let spaced = if changed.is_empty() { None } else { Some(space(scan, memory, &changed)) };
-    support(scan, memory);
-    bound_in_order(&memory.items, &topology, &mut memory.boxes);
+    memory.closing.support(scan);
+    memory.closing.turn(scan);
+    memory.closing.bound(scan);
     if let Some(looks) = spaced {
-        // Boxes about points suffice to find neighbours.
-        set_reaches(&topology, &mut memory.boxes, &scan.arrays.radii);
-        scan.meta.root.bounds = memory.boxes[NodeId::ROOT.index()];
-        siblings(&topology, &memory.boxes, scan.arrays.siblings.to_mut());
+        // The boxes so far contain the points, which suffices to find neighbours.
         fit(scan, memory, &changed, &looks);
+        memory.closing.bound(scan);
     }
-    bound(scan, memory);
     let fitted = changed.iter().map(|leaf| topology.points_of_leaf(*leaf as usize).len()).sum();
     memory.changed = changed;
-    finish(scan, memory);
+    memory.closing.finish(scan);
     Refitted { carried: scan.len() - fitted, fitted }
 }
 
 /// Sets the positions and the frame.
-fn place(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>) {
+pub(crate) fn place(scan: &mut PointHierarchy, placed: &NextFrame<'_>) {
     // Unpacks the positions of a scan from a file.
     let _unpacked = scan.positions();
     let (source, NextFrame { points, frame, .. }): (&[u32], _) = (&scan.arrays.source, placed);
-    fill(&mut memory.items, |i| Item {
-        position: frame.to_local(points[source[i] as usize]),
-        index: source[i],
-    });
-    let items: &[Item] = &memory.items;
-    if let Some(positions) = scan.positions.get_mut() {
-        fill(positions.to_mut(), |i| items[i].position);
-    }
+    let Some(positions) = scan.positions.get_mut() else { return };
+    fill(positions.to_mut(), |i| frame.to_local(points[source[i] as usize]));
+    let positions: &[[f32; 3]] = positions;
     change_each(scan.arrays.blocks.to_mut(), WIDTH, |number, block| {
-        for (lane, item) in items[number * WIDTH..].iter().take(WIDTH).enumerate() {
+        for (lane, p) in positions[number * WIDTH..].iter().take(WIDTH).enumerate() {
             for k in 0..3 {
-                block.position[k][lane] = item.position[k];
+                block.position[k][lane] = p[k];
             }
         }
     });
@@ -163,16 +152,16 @@ fn place(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>)
 /// Carries normals and radii along with their leaves.
 fn carry(scan: &mut PointHierarchy, memory: &mut Memory) {
     let (topology, reach) = (scan.topology, scan.meta.reach);
-    let Memory { positions, normals, radii, leaves, motions, items, .. } = memory;
+    let Memory { positions, normals, radii, leaves, motions, .. } = memory;
     let (positions, normals, radii): (&[_], &[_], &[_]) = (positions, normals, radii);
-    fill(motions, |leaf| {
+    let (now, level) = (scan.positions(), Level::new());
+    change_each(motions, WIDTH, |leaf, motion| {
         let points = topology.points_of_leaf(leaf);
-        let mut now = [[0.0; 3]; crate::tree::topology::MOST_LEAF_POINTS];
-        let now = &mut now[..points.len()];
-        for (place, item) in now.iter_mut().zip(&items[points.clone()]) {
-            *place = item.position;
-        }
-        leaves[leaf].motion(&positions[points.clone()], now, &radii[points], (STRETCH, OFF))
+        let (before, now, radii) = (&positions[points.clone()], &now[points.clone()], &radii[points]);
+        *motion = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || leaves[leaf].motion(before, now, radii, (STRETCH, OFF)),
+        ));
     });
     let (motions, leaf_size): (&[Motion], _) = (motions, topology.leaf_size());
     fill(scan.arrays.normals.to_mut(), |i| motions[i / leaf_size].normal(normals[i]));
@@ -216,25 +205,6 @@ fn space(
     }
 }
 
-/// Sets the sampling radius, the support radii of the points, and the balls around blocks. There are
-/// no neighbour lists afterwards.
-fn support(scan: &mut PointHierarchy, memory: &mut Memory) {
-    scan.meta.sampling_radius = quantile(&scan.arrays.radii, &mut memory.counts);
-    let (radius, unit) = (f64::from(scan.meta.sampling_radius), 1.0 / scan.meta.frame.scale);
-    // The options were valid for the first frame.
-    scan.plan = SurfacePlan::new(&scan.meta.surface, radius, unit).unwrap_or(scan.plan);
-    let (plan, radii): (_, &[f32]) = (&scan.plan, &scan.arrays.radii);
-    let blocks = scan.arrays.blocks.to_mut();
-    change_each(blocks, WIDTH, |number, block| {
-        plan.tune(block, &radii[number * WIDTH..radii.len().min((number + 1) * WIDTH)]);
-    });
-    fill_groups(blocks, scan.arrays.groups.to_mut());
-    if !scan.arrays.listed.is_empty() {
-        scan.arrays.lists.to_mut().fill(NeighbourList { within: -1.0, first: 0, count: 0 });
-        scan.arrays.listed = Array::default();
-    }
-}
-
 /// Fits the surface at the points of the `changed` leaves anew, and takes them as they are then for
 /// their state at rest.
 fn fit(
@@ -275,69 +245,5 @@ fn fit(
     }
     for leaf in changed {
         memory.rest(scan, *leaf as usize);
-    }
-}
-
-/// Fits boxes and enclosures along the axes in memory.
-fn bound(scan: &mut PointHierarchy, memory: &mut Memory) {
-    let PointHierarchy { meta, plan, topology, arrays, .. } = scan;
-    let Memory { parts, boxes, growths, .. } = memory;
-    let discs = DiscRadii {
-        codes: &arrays.codes,
-        radii: &arrays.radii,
-        reach: meta.reach,
-        sampling_radius: meta.sampling_radius,
-    };
-    let of_points = Parts { normals: &arrays.normals, discs, dense: meta.dense as usize };
-    fill(parts, |number| of_points.block(number));
-    let greatest = arrays.radii.iter().copied().fold(0.0, f32::max);
-    let beyond = 0.5 * plan.support_radius(greatest);
-    bound_parts(topology, (boxes, growths), (&arrays.blocks, parts), beyond);
-    siblings(topology, boxes, arrays.siblings.to_mut());
-    let growths: &[[Growth; 2]] = growths;
-    growths_of_siblings(topology, |id| growths[id][0], arrays.surface_growths.to_mut());
-    growths_of_siblings(topology, |id| growths[id][1], arrays.obstacle_growths.to_mut());
-    meta.root = Root { bounds: boxes[NodeId::ROOT.index()], growths: growths[NodeId::ROOT.index()] };
-}
-
-/// Computes everything that depends on boxes.
-fn finish(scan: &mut PointHierarchy, memory: &Memory) {
-    let PointHierarchy { meta, topology, arrays, positions, .. } = scan;
-    let parts = LeafParts {
-        positions: positions.get().map_or(&[], |positions| positions),
-        normals: &arrays.normals,
-        discs: DiscRadii {
-            codes: &arrays.codes,
-            radii: &arrays.radii,
-            reach: meta.reach,
-            sampling_radius: meta.sampling_radius,
-        },
-        dense: meta.dense as usize,
-    };
-    let of_leaf = |leaf: usize| memory.boxes[topology.leaf(leaf).index()];
-    parts.fill(topology, of_leaf, (arrays.leaf_blocks.to_mut(), arrays.marks.to_mut()));
-    spacings(topology, &arrays.radii, arrays.coverings.to_mut());
-    scan.meta.outline = scan.outlined();
-}
-
-/// Sets the spacings of all nodes, and withholds their radii.
-fn spacings(topology: &Topology, radii: &[f32], coverings: &mut [Covering]) {
-    // Children come after their parent.
-    for id in topology.ids().rev() {
-        let points = topology.points(id);
-        #[expect(clippy::cast_precision_loss, reason = "a mean")]
-        let count = points.len() as f32;
-        let sum: f32 = if topology.is_leaf(id) {
-            radii[points].iter().map(|r| r * r).sum()
-        } else {
-            let of = |child: NodeId| {
-                #[expect(clippy::cast_precision_loss, reason = "a mean")]
-                let count = topology.points(child).len() as f32;
-                coverings[child.index()].spacing.powi(2) * count
-            };
-            topology.children(id).iter().map(of).sum()
-        };
-        let spacing = (sum / count).sqrt();
-        coverings[id.index()] = Covering { radius: f32::INFINITY, sampling: f32::INFINITY, spacing };
     }
 }

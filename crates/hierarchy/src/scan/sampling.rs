@@ -53,13 +53,8 @@ impl Sampling {
         let mut radii = smooth(&tree, &spacings, work)?;
         work.progress().reach(share::RADII);
         let mut counts = Vec::new();
-        #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-        let reach = options
-            .reach
-            .map_or_else(|| REACH * quantile(&radii, &mut counts), |reach| (reach * unit) as f32);
-        if !(reach.is_normal() && reach >= f32::EPSILON * extent(positions)) {
-            return Err(BuildError::Reach(f64::from(reach) / unit));
-        }
+        let reach = reach_of(options, quantile(&radii, &mut counts), unit);
+        check_reach(reach, extent(positions), unit)?;
         limit(&mut spacings, &mut radii, reach);
         let sampling_radius = quantile(&radii, &mut counts);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
@@ -69,6 +64,19 @@ impl Sampling {
         }
         Ok(Self { spacings, radii, sampling_radius, reach, plan, blocks })
     }
+}
+
+/// Returns the upper limit of all radii, given the 0.9-quantile of those that are not limited yet.
+#[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+pub(crate) fn reach_of(options: &BuildOptions, quantile: f32, unit: f64) -> f32 {
+    options.reach.map_or(REACH * quantile, |reach| (reach * unit) as f32)
+}
+
+/// Checks that a reach is positive, finite, and more than the rounding error of coordinates up to
+/// `extent`.
+pub(crate) fn check_reach(reach: f32, extent: f32, unit: f64) -> Result<(), BuildError> {
+    let is_sound = reach.is_normal() && reach >= f32::EPSILON * extent;
+    if is_sound { Ok(()) } else { Err(BuildError::Reach(f64::from(reach) / unit)) }
 }
 
 /// Sets the greatest radius of the points in the boxes of all nodes.

@@ -48,6 +48,21 @@ pub(crate) fn split(items: &mut [Item], topology: &Topology, dense: usize, boxes
     Place { items, dense, half: Half::ALL }.split(topology, &boxes);
 }
 
+/// The number of leaves that [`split_loose`] splits at most together.
+const LEAVES_SPLIT: usize = 16;
+
+/// Orders items that are in a good order for the most part, such as pixels along a curve: where the
+/// points of a leaf `are_loose`, those of the up to sixteen leaves around it are split anew. The first
+/// `dense` items stay before the others, as in [`split`].
+pub(crate) fn split_loose(
+    items: &mut [Item],
+    topology: &Topology,
+    dense: usize,
+    are_loose: &(impl Fn(&[Item]) -> bool + Sync),
+) {
+    Place { items, dense, half: Half::ALL }.split_loose(topology, are_loose);
+}
+
 /// Sets `boxes` to the boxes around the points of all nodes, whose order stays. O(n log n).
 pub(crate) fn bound_in_order(items: &[Item], topology: &Topology, boxes: &mut [OrientedBox]) {
     const AT_ONCE: usize = 16;
@@ -90,6 +105,26 @@ impl<'a> Place<'a> {
         }
     }
 
+    /// Splits the points of loose leaves and those around them.
+    fn split_loose(self, topology: &Topology, are_loose: &(impl Fn(&[Item]) -> bool + Sync)) {
+        let Place { items, dense, half } = self;
+        if topology.leaves_of(half).len() <= LEAVES_SPLIT {
+            if items.chunks(topology.leaf_size()).any(are_loose) {
+                Place { items, dense, half }.split_into(topology, &mut Vec::new());
+            }
+            return;
+        }
+        let [left, right] = Place { items, dense, half }.at_halves(topology);
+        let (left, right) =
+            (|| left.split_loose(topology, are_loose), || right.split_loose(topology, are_loose));
+        if TASK < topology.leaves_of(half).len() * topology.leaf_size() {
+            both(left, right);
+        } else {
+            left();
+            right();
+        }
+    }
+
     /// Does the same on one thread, and adds the nodes with their boxes to `found`.
     fn split_into(self, topology: &Topology, found: &mut Vec<(NodeId, OrientedBox)>) {
         let bounds = about(Level::new(), self.items);
@@ -109,7 +144,7 @@ impl<'a> Place<'a> {
     /// there are both kinds only one of them has to be partitioned.
     fn halve(self, topology: &Topology, bounds: &OrientedBox) -> [Self; 2] {
         let Place { items, dense, half } = self;
-        let ([left, right], all) = (half.halves(), items.len());
+        let ([left, _], all) = (half.halves(), items.len());
         let count = topology.leaves_of(left).len() * topology.leaf_size();
         let of_one_sort = if count < dense { 0..dense } else { dense..items.len() };
         let (some, within) = (&mut items[of_one_sort.clone()], count - of_one_sort.start);
@@ -119,8 +154,15 @@ impl<'a> Place<'a> {
             let axis = best_axis(level, some, &own, within);
             partition(some, axis, within);
         }
-        let (of_left, of_right) = items.split_at_mut(count);
-        let dense_left = dense.min(count);
+        Place { items, dense, half }.at_halves(topology)
+    }
+
+    /// Divides the points, which are in order, in two.
+    fn at_halves(self, topology: &Topology) -> [Self; 2] {
+        let Place { items, dense, half } = self;
+        let [left, right] = half.halves();
+        let (of_left, of_right) = items.split_at_mut(topology.leaves_of(left).len() * topology.leaf_size());
+        let dense_left = dense.min(of_left.len());
         [
             Self { items: of_left, dense: dense_left, half: left },
             Self { items: of_right, dense: dense - dense_left, half: right },

@@ -332,6 +332,22 @@ impl Topology {
         leaves.start as usize..leaves.end as usize
     }
 
+    /// Returns the nodes under an inner node whose children are leaves, by their ids. The node itself
+    /// if it is one of them.
+    pub(crate) fn bottoms_under(&self, id: NodeId) -> Range<usize> {
+        let (mut first, mut last) = (id.0, id.0);
+        while first < self.bottom {
+            let children = self.children(NodeId(last));
+            (first, last) = (self.children(NodeId(first)).first, children.first + children.count - 1);
+        }
+        first as usize..last as usize + 1
+    }
+
+    /// Returns the first node whose children are leaves.
+    pub(crate) const fn first_bottom(&self) -> usize {
+        self.bottom as usize
+    }
+
     /// Returns the points under a node.
     #[inline]
     #[must_use]
@@ -407,6 +423,19 @@ mod tests {
                     next = points.end;
                 }
                 assert_eq!(next, own.end, "{tree:?}, {id:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_lowest_inner_nodes_under_a_node_share_its_leaves() {
+        for tree in trees().filter(|tree| tree.len() < 3000 && tree.inner() > 0) {
+            for id in tree.ids().filter(|&id| !tree.is_leaf(id)) {
+                let bottoms = tree.bottoms_under(id);
+                let leaves = bottoms.clone().map(|node| tree.leaves_under(NodeId(id32(node))));
+                let all: Vec<usize> = leaves.flatten().collect();
+                assert_eq!(all, tree.leaves_under(id).collect::<Vec<_>>(), "{tree:?}, {id:?}");
+                assert!(bottoms.start >= tree.first_bottom(), "{tree:?}, {id:?}");
             }
         }
     }

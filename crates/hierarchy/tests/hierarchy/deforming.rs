@@ -169,7 +169,7 @@ fn a_scan_at_rest_keeps_its_discs_and_a_renewed_one_equals_a_prepared_one() {
             assert!((0..scan.len()).all(|i| scan.kind(i) == first.kind(i)), "{kind:?}");
             assert!(scan.discs().iter().eq(first.discs().iter()), "{kind:?}");
             assert_eq!(scan.reach(), first.reach(), "{kind:?}");
-            assert_eq!(scan.outline().identity, first.outline().identity, "{kind:?}");
+            assert_eq!(scan.sampling_radius(), first.sampling_radius(), "{kind:?}");
         }
         // Renewed in another frame, it equals one that was prepared there and kept its order.
         scan.renew(shear).unwrap();
@@ -177,6 +177,93 @@ fn a_scan_at_rest_keeps_its_discs_and_a_renewed_one_equals_a_prepared_one() {
         other.renew(shear).unwrap();
         assert_eq!(scan.outline(), other.outline(), "{kind:?}: history does not matter");
     }
+}
+
+#[test]
+fn replaced_points_are_fitted_as_prepared_ones() {
+    let mut found = 0;
+    for (kind, points, size) in clouds() {
+        let Ok(mut scan) = DeformingScan::new(&points, &BuildOptions::default()) else { continue };
+        let shear = &frames(&points[10..], size, 4)[2].1;
+        let Ok(anew) = DeformingScan::new(shear, &BuildOptions::default()) else { continue };
+        scan.replace(shear).unwrap();
+        assert_eq!(scan.sanity_check(), Ok(()), "{kind:?}");
+        assert_eq!(scan.source(), anew.source(), "{kind:?}");
+        assert_eq!((scan.radii(), scan.normals()), (anew.radii(), anew.normals()), "{kind:?}");
+        assert!(scan.discs().iter().eq(anew.discs().iter()), "{kind:?}");
+        found += check_enclosed(&scan, 5, "replaced")[0];
+    }
+    assert!(found > 2000, "{found} places of surfaces");
+}
+
+/// A scene as a depth camera sees it: a wall, a floor, two balls before them, holes and noise.
+pub(crate) fn depth_frame(width: u32, height: u32, time: f64) -> Vec<[f64; 3]> {
+    let focus = 0.9 * f64::from(width);
+    let balls = [([-0.4 + 0.2 * time.sin(), 0.2, 2.0], 0.45), ([0.6, 0.5, 2.6], 0.35)];
+    let mut random = rng(3);
+    let mut pixel = |i: u32| {
+        let (u, v) = (f64::from(i % width), f64::from(i / width));
+        let d = [(u - 0.5 * f64::from(width)) / focus, (v - 0.5 * f64::from(height)) / focus, 1.0];
+        let mut depth: f64 = if d[1] > 0.0 { (0.9 / d[1]).min(3.5) } else { 3.5 };
+        for (centre, radius) in balls {
+            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let (dd, dc, cc) = (dot(d, d), dot(d, centre), dot(centre, centre) - radius * radius);
+            let root = dc * dc - dd * cc;
+            depth = if root > 0.0 { depth.min((dc - root.sqrt()) / dd) } else { depth };
+        }
+        let [noise, hole, _] = point_in(&mut random, 1.0);
+        if hole > 0.96 || (i % width / 9 + i / width / 9) % 13 == 5 {
+            return if hole > 0.0 { [f64::NAN; 3] } else { [0.0; 3] };
+        }
+        d.map(|x| x * depth * (1.0 + 3e-4 * noise))
+    };
+    (0..width * height).map(&mut pixel).collect()
+}
+
+#[test]
+fn a_depth_frame_is_fitted_by_pixels_nearly_as_by_distances() {
+    let first = depth_frame(96, 72, 0.0);
+    let still: Vec<[f64; 3]> = first.iter().copied().filter(|p| p[2] > 0.0).collect();
+    let mut scan = DeformingScan::new(&still, &BuildOptions::default()).unwrap();
+    for step in 0..3_u8 {
+        let frame = depth_frame(96, 72, f64::from(step));
+        scan.replace_organised(&frame, 96).unwrap();
+        assert_eq!(scan.sanity_check(), Ok(()), "frame {step}");
+        let measured: Vec<[f64; 3]> = frame.iter().copied().filter(|p| p[2] > 0.0).collect();
+        assert_eq!(scan.len(), measured.len(), "frame {step}");
+        let anew = DeformingScan::new(&measured, &BuildOptions::default()).unwrap();
+        let ratio = scan.sampling_radius() / anew.sampling_radius();
+        assert!((ratio - 1.0).abs() < 0.05, "frame {step}: the sampling radius is {ratio} of the exact one");
+        assert!((scan.sheet_share() - anew.sheet_share()).abs() < 0.02, "frame {step}");
+        let places: Vec<usize> = (0..frame.len()).filter(|i| frame[*i][2] > 0.0).collect();
+        let mut of_pixel = vec![0; frame.len()];
+        (0..anew.len()).for_each(|i| of_pixel[places[anew.source()[i] as usize]] = i);
+        let same = (0..scan.len()).filter(|&i| {
+            let other = of_pixel[scan.source()[i] as usize];
+            let cosine: f32 = (0..3).map(|k| scan.normals()[i][k] * anew.normals()[other][k]).sum();
+            let ratio = scan.radii()[i] / anew.radii()[other];
+            cosine.abs() > 0.95 && (0.8..1.25).contains(&ratio) && scan.kind(i) == anew.kind(other)
+        });
+        let share = same.count() as f64 / scan.len() as f64;
+        assert!(share > 0.9, "frame {step}: {share} of all points are as prepared");
+        let [surface, obstacle] = check_enclosed(&scan, step.into(), "a depth frame");
+        assert!(surface.min(obstacle) > 4000, "frame {step}: {surface}, {obstacle}");
+        let moved: Vec<[f64; 3]> = frame.iter().map(|p| [p[0] + 0.1, p[1], p[2]]).collect();
+        assert!(matches!(scan.refit(&moved), Err(DeformError::NotFinite { .. })), "holes do not move");
+    }
+    let identity = scan.outline().identity;
+    scan.replace_organised(&depth_frame(96, 72, 2.0), 96).unwrap();
+    assert_eq!(scan.outline().identity, identity, "history does not matter");
+    let none = vec![[f64::NAN; 3]; 64];
+    assert!(matches!(scan.replace_organised(&none, 8), Err(DeformError::Cloud(_))), "nothing is measured");
+    let faulty = scan.replace_organised(&first, 1000);
+    assert_eq!(faulty, Err(DeformError::Image { width: 1000, got: 96 * 72 }), "no rows of 1000");
+    assert_eq!(scan.outline().identity, identity, "the scan is unchanged");
+    // Pixels far apart do not tell neighbours.
+    let scattered: Vec<[f64; 3]> =
+        (0..first.len()).map(|i| if i % 7 == 0 { first[i] } else { [f64::NAN; 3] }).collect();
+    scan.replace_organised(&scattered, 96).unwrap();
+    assert_eq!(scan.sanity_check(), Ok(()), "scattered pixels");
 }
 
 #[test]

@@ -1,0 +1,120 @@
+//! A scan whose points are all fitted anew, without what takes longest to prepare: enclosures from
+//! neighbours, coverings and neighbour lists (`docs/theory/moving.md`).
+
+use std::sync::OnceLock;
+
+use bytemuck::{Pod, Zeroable};
+use nearmiss_geometry::NodeId;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::{change_runs, fill, fill_runs};
+use nearmiss_store::{Array, Workspace};
+
+use crate::patch::surfels::{align, codes_of};
+use crate::point::gather::{Index, NeighbourList};
+use crate::point::leaf_block::LeafParts;
+use crate::point::neighbours::groups;
+use crate::scan::build::PointHierarchy;
+use crate::scan::closing::Closing;
+use crate::scan::data::Arrays;
+use crate::scan::options::{BuildError, BuildOptions};
+use crate::scan::ordered::Ordered;
+use crate::scan::points::ScanPoints;
+use crate::scan::prepare::about;
+use crate::tree::topology::Topology;
+use crate::tree::wide::{Bare, Root};
+
+/// Fits the surface at points that are in order, and bounds the nodes as a refit does.
+pub(crate) fn fitted_anew(
+    points: &ScanPoints<'_>,
+    ordered: Ordered,
+    options: &BuildOptions,
+    closing: &mut Closing,
+) -> Result<PointHierarchy, BuildError> {
+    let work = Workspace::in_memory();
+    let Ordered { topology, boxes, positions, source, radii, fits, blocks, plan, summary } = ordered;
+    let groups = groups(&blocks, &work)?;
+    let bare = Bare::new(&work, topology, &boxes)?;
+    let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
+    let leaves: Vec<u32> = (0..topology.leaves()).map(id32).collect();
+    let codes = codes_of(&index, &positions, &fits, &leaves);
+    let mut normals: Vec<[f32; 3]> = fits.iter().map(|fit| fit.normal).collect();
+    change_runs(&mut normals, LEAVES_AT_ONCE * topology.leaf_size(), |_, normals| {
+        normals.chunks_mut(topology.leaf_size()).for_each(align);
+    });
+    let arrays = Arrays {
+        blocks: blocks.into(),
+        groups: groups.into(),
+        normals: normals.into(),
+        radii: radii.into(),
+        codes: codes.into(),
+        source: source.into(),
+        ..Arrays::default()
+    };
+    let meta = about(points, options, *plan.options(), summary, Root::default());
+    let positions = OnceLock::from(Array::from(positions));
+    let mut scan = PointHierarchy { meta, plan, topology, arrays, positions };
+    resize(&mut scan, topology);
+    closing.reserve(&scan);
+    closing.support(&mut scan);
+    closing.turn(&scan);
+    closing.bound(&mut scan);
+    closing.finish(&mut scan);
+    Ok(scan)
+}
+
+/// The number of leaves whose normals a thread aligns at once.
+const LEAVES_AT_ONCE: usize = 16;
+
+/// Gives the arrays of a scan the sizes for a topology. Neighbour lists become empty, samples are
+/// spread evenly over the points of each node, and the other arrays are to be filled.
+pub(crate) fn resize(scan: &mut PointHierarchy, topology: Topology) {
+    let points = topology.points(NodeId::ROOT).len();
+    let blocks = points.div_ceil(nearmiss_index::PointBlock::WIDTH);
+    scan.topology = topology;
+    let arrays = &mut scan.arrays;
+    sized(&mut arrays.siblings, topology.inner());
+    sized(&mut arrays.surface_growths, topology.inner());
+    sized(&mut arrays.obstacle_growths, topology.inner());
+    sized(&mut arrays.leaf_blocks, topology.leaves() * LeafParts::blocks_a_leaf(&topology));
+    sized(&mut arrays.marks, topology.leaves());
+    sized(&mut arrays.blocks, blocks);
+    sized(&mut arrays.coverings, topology.len());
+    sized(&mut arrays.groups, blocks.div_ceil(nearmiss_index::PointBlock::WIDTH));
+    sized(&mut arrays.lists, blocks);
+    arrays.lists.to_mut().fill(NeighbourList { within: -1.0, first: 0, count: 0 });
+    arrays.listed = Array::default();
+    sized(&mut arrays.normals, points);
+    sized(&mut arrays.radii, points);
+    sized(&mut arrays.codes, points);
+    sized(&mut arrays.source, points);
+    let samples = scan.meta.samples as usize;
+    sized(&mut arrays.sample_lists, topology.inner() * samples);
+    fill_runs(arrays.sample_lists.to_mut(), samples, |node, list| {
+        let points = topology.points(NodeId(id32(node)));
+        for (k, sample) in list.iter_mut().enumerate() {
+            *sample = id32(points.start + (k * points.len().max(samples) / samples).min(points.len() - 1));
+        }
+    });
+    if let Some(positions) = scan.positions.get_mut() {
+        sized(positions, points);
+    }
+}
+
+/// Changes the length of an array that is not shared, without a copy.
+fn sized<T: Pod + Zeroable + Send>(array: &mut Array<T>, len: usize) {
+    if array.len() != len {
+        let mut elements = std::mem::take(array).into_vec();
+        elements.resize(len, T::zeroed());
+        *array = elements.into();
+    }
+}
+
+/// Sets the normals of all points, each to the side of the others in its leaf.
+pub(crate) fn set_normals(scan: &mut PointHierarchy, normal: impl Fn(usize) -> [f32; 3] + Sync + Send) {
+    let leaf_size = scan.topology.leaf_size();
+    let normals = scan.arrays.normals.to_mut();
+    fill(normals, normal);
+    change_runs(normals, LEAVES_AT_ONCE * leaf_size, |_, normals| {
+        normals.chunks_mut(leaf_size).for_each(align);
+    });
+}

@@ -1,0 +1,136 @@
+//! The last steps of every frame of a scan that moves: support radii, boxes, enclosures and leaf
+//! records of the current points, radii, normals and classes (`docs/theory/moving.md`).
+
+use nearmiss_geometry::NodeId;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::parallel::{change_each, fill};
+use nearmiss_store::Array;
+use nearmiss_surface::{EigenBlock, SurfacePlan};
+
+use crate::bounds::boxes::OrientedBox;
+use crate::bounds::growth::Growth;
+use crate::patch::covering::Covering;
+use crate::patch::parts::{PartBlock, Parts, bound_parts};
+use crate::point::disc::DiscRadii;
+use crate::point::gather::NeighbourList;
+use crate::point::leaf_block::LeafParts;
+use crate::point::neighbours::groups_in_motion;
+use crate::scan::build::PointHierarchy;
+use crate::scan::sampling::quantile;
+use crate::tree::axes::{Spread, principal_axes};
+use crate::tree::topology::Topology;
+use crate::tree::wide::{Root, growths_of_siblings, siblings};
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// Memory that frames reuse.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Closing {
+    parts: Vec<PartBlock>,
+    boxes: Vec<OrientedBox>,
+    growths: Vec<[Growth; 2]>,
+    spreads: Vec<Spread>,
+    solved: Vec<EigenBlock>,
+    counts: Vec<usize>,
+}
+
+impl Closing {
+    /// Takes as much memory as a scan needs.
+    pub(crate) fn reserve(&mut self, scan: &PointHierarchy) {
+        let nodes = scan.topology.len();
+        self.parts.resize(scan.arrays.blocks.len(), bytemuck::Zeroable::zeroed());
+        self.boxes.resize(nodes, OrientedBox::default());
+        self.growths.resize(nodes, Default::default());
+    }
+
+    /// Sets the sampling radius, the support radii of the points, and the balls around blocks. There
+    /// are no neighbour lists afterwards.
+    pub(crate) fn support(&mut self, scan: &mut PointHierarchy) {
+        scan.meta.sampling_radius = quantile(&scan.arrays.radii, &mut self.counts);
+        let (radius, unit) = (f64::from(scan.meta.sampling_radius), 1.0 / scan.meta.frame.scale);
+        // The options were valid for the first frame.
+        scan.plan = SurfacePlan::new(&scan.meta.surface, radius, unit).unwrap_or(scan.plan);
+        let (plan, radii): (_, &[f32]) = (&scan.plan, &scan.arrays.radii);
+        let blocks = scan.arrays.blocks.to_mut();
+        change_each(blocks, WIDTH, |number, block| {
+            plan.tune(block, &radii[number * WIDTH..radii.len().min((number + 1) * WIDTH)]);
+        });
+        groups_in_motion(blocks, scan.arrays.groups.to_mut());
+        if !scan.arrays.listed.is_empty() {
+            scan.arrays.lists.to_mut().fill(NeighbourList { within: -1.0, first: 0, count: 0 });
+            scan.arrays.listed = Array::default();
+        }
+    }
+
+    /// Finds the axes of all nodes.
+    pub(crate) fn turn(&mut self, scan: &PointHierarchy) {
+        let memory = (&mut self.spreads, &mut self.solved);
+        principal_axes(scan.positions(), &scan.topology, &mut self.boxes, memory);
+    }
+
+    /// Fits boxes and enclosures along the axes.
+    pub(crate) fn bound(&mut self, scan: &mut PointHierarchy) {
+        let PointHierarchy { meta, plan, topology, arrays, .. } = scan;
+        let Self { parts, boxes, growths, .. } = self;
+        let discs = DiscRadii {
+            codes: &arrays.codes,
+            radii: &arrays.radii,
+            reach: meta.reach,
+            sampling_radius: meta.sampling_radius,
+        };
+        let of_points = Parts { normals: &arrays.normals, discs, dense: meta.dense as usize };
+        change_each(parts, WIDTH, |number, part| *part = of_points.block(number));
+        let greatest = arrays.radii.iter().copied().fold(0.0, f32::max);
+        let beyond = 0.5 * plan.support_radius(greatest);
+        bound_parts(topology, (boxes, growths), (&arrays.blocks, parts), beyond);
+        siblings(topology, boxes, arrays.siblings.to_mut());
+        let growths: &[[Growth; 2]] = growths;
+        growths_of_siblings(topology, |id| growths[id][0], arrays.surface_growths.to_mut());
+        growths_of_siblings(topology, |id| growths[id][1], arrays.obstacle_growths.to_mut());
+        meta.root = Root { bounds: boxes[NodeId::ROOT.index()], growths: growths[NodeId::ROOT.index()] };
+    }
+
+    /// Computes everything that depends on boxes.
+    pub(crate) fn finish(&self, scan: &mut PointHierarchy) {
+        let PointHierarchy { meta, topology, arrays, positions, .. } = scan;
+        let parts = LeafParts {
+            positions: positions.get().map_or(&[], |positions| positions),
+            normals: &arrays.normals,
+            discs: DiscRadii {
+                codes: &arrays.codes,
+                radii: &arrays.radii,
+                reach: meta.reach,
+                sampling_radius: meta.sampling_radius,
+            },
+            dense: meta.dense as usize,
+        };
+        let of_leaf = |leaf: usize| self.boxes[topology.leaf(leaf).index()];
+        parts.fill(topology, of_leaf, (arrays.leaf_blocks.to_mut(), arrays.marks.to_mut()));
+        spacings(topology, &arrays.radii, arrays.coverings.to_mut());
+        scan.meta.outline = scan.outlined();
+    }
+}
+
+/// Sets the spacings of all nodes, and withholds their radii.
+fn spacings(topology: &Topology, radii: &[f32], coverings: &mut [Covering]) {
+    let withheld = |spacing| Covering { radius: f32::INFINITY, sampling: f32::INFINITY, spacing };
+    let inner = topology.inner();
+    fill(&mut coverings[inner..], |leaf| {
+        let radii = &radii[topology.points_of_leaf(leaf)];
+        #[expect(clippy::cast_precision_loss, reason = "a mean")]
+        let mean = radii.iter().map(|r| r * r).sum::<f32>() / radii.len() as f32;
+        withheld(mean.sqrt())
+    });
+    // Children come after their parent.
+    for id in topology.ids().take(inner).rev() {
+        let of = |child: NodeId| {
+            #[expect(clippy::cast_precision_loss, reason = "a mean")]
+            let count = topology.points(child).len() as f32;
+            coverings[child.index()].spacing.powi(2) * count
+        };
+        let sum: f32 = topology.children(id).iter().map(of).sum();
+        #[expect(clippy::cast_precision_loss, reason = "a mean")]
+        let count = topology.points(id).len() as f32;
+        coverings[id.index()] = withheld((sum / count).sqrt());
+    }
+}

@@ -1,0 +1,140 @@
+//! The principal axes of all nodes, from the moments of their leaves: in O(n), where summing over
+//! the points of every node takes O(n log n).
+
+use std::ops::Range;
+
+use fearless_simd::Level;
+use nearmiss_geometry::NodeId;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::change_each;
+use nearmiss_lanes::vector::sub;
+use nearmiss_surface::{EigenBlock, MatrixBlock, symmetric_eigen_batch};
+
+use crate::bounds::boxes::{OrientedBox, to_axes};
+use crate::tree::topology::Topology;
+
+/// The moments of some points about their mean.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Spread {
+    count: f64,
+    mean: [f64; 3],
+    /// The sums of the products of coordinates relative to the mean, as xx xy xz yy yz zz.
+    second: [f64; 6],
+}
+
+fn products([x, y, z]: [f64; 3]) -> [f64; 6] {
+    [x * x, x * y, x * z, y * y, y * z, z * z]
+}
+
+impl Spread {
+    fn of(points: &[[f32; 3]]) -> Self {
+        let (origin, mut first, mut second) = (points[0], [0.0; 3], [0.0; 6]);
+        for p in points {
+            let d = sub(*p, origin).map(f64::from);
+            first = [first[0] + d[0], first[1] + d[1], first[2] + d[2]];
+            let all = products(d);
+            for k in 0..6 {
+                second[k] += all[k];
+            }
+        }
+        #[expect(clippy::cast_precision_loss, reason = "at most 64")]
+        let count = points.len() as f64;
+        let shift = first.map(|x| x / count);
+        let moved = products(shift);
+        for k in 0..6 {
+            second[k] -= count * moved[k];
+        }
+        Self { count, mean: [0, 1, 2].map(|k| f64::from(origin[k]) + shift[k]), second }
+    }
+
+    /// The moments of both sets of points together.
+    fn with(self, other: Self) -> Self {
+        let count = self.count + other.count;
+        let share = other.count / count;
+        let apart = [0, 1, 2].map(|k| other.mean[k] - self.mean[k]);
+        let between = products(apart);
+        let mut second = [0.0; 6];
+        for k in 0..6 {
+            second[k] = self.second[k] + other.second[k] + self.count * share * between[k];
+        }
+        Self { count, mean: [0, 1, 2].map(|k| self.mean[k] + share * apart[k]), second }
+    }
+}
+
+/// Sets the axes of all `boxes` to the principal axes of the points of their nodes, the greatest
+/// variance first. `spreads` and `solved` are reused memory.
+pub(crate) fn principal_axes(
+    positions: &[[f32; 3]],
+    topology: &Topology,
+    boxes: &mut [OrientedBox],
+    (spreads, solved): (&mut Vec<Spread>, &mut Vec<EigenBlock>),
+) {
+    const AT_ONCE: usize = 64;
+    const WIDTH: usize = MatrixBlock::WIDTH;
+    let (count, inner, level) = (topology.len(), topology.inner(), Level::new());
+    spreads.resize(count, Spread::default());
+    solved.resize(count.div_ceil(WIDTH), EigenBlock::default());
+    change_each(&mut spreads[inner..], AT_ONCE, |leaf, spread| {
+        *spread = Spread::of(&positions[topology.points_of_leaf(leaf)]);
+    });
+    // Children come after their parent.
+    for id in (0..inner).rev() {
+        let children = topology.children(NodeId(id32(id))).iter().map(|child| spreads[child.index()]);
+        spreads[id] = children.reduce(Spread::with).unwrap_or_default();
+    }
+    let spreads: &[Spread] = spreads;
+    change_each(solved, AT_ONCE / WIDTH, |number, solved| {
+        let mut block = MatrixBlock::default();
+        let of_block: Range<usize> = number * WIDTH..count.min((number + 1) * WIDTH);
+        for (lane, spread) in spreads[of_block].iter().enumerate() {
+            block.put(lane, spread.second);
+        }
+        symmetric_eigen_batch(level, &[block], std::slice::from_mut(solved));
+    });
+    let solved: &[EigenBlock] = solved;
+    change_each(boxes, AT_ONCE, |id, bounds| {
+        let [short, middle, long] = solved[id / WIDTH].get(id % WIDTH).vectors;
+        // The reversed order makes the frame left-handed; negating the last axis mends that.
+        bounds.axes = to_axes([long, middle, short.map(|c| -c)]);
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::{CloudKind, cloud};
+
+    use super::*;
+    use crate::tree::split::{Item, bound_in_order};
+
+    #[test]
+    fn axes_from_moments_span_boxes_as_small_as_axes_from_points() {
+        for kind in [CloudKind::Sphere, CloudKind::Random, CloudKind::Lattice, CloudKind::Clustered] {
+            let points: Vec<[f32; 3]> =
+                cloud(kind, 900, 3).iter().map(|p| p.map(|x| x as f32 + 100.0)).collect();
+            let items: Vec<Item> =
+                (0..).zip(&points).map(|(index, p)| Item { position: *p, index }).collect();
+            for leaf_size in [16, 10] {
+                let topology = Topology::new(id32(points.len()), leaf_size);
+                let mut boxes = vec![OrientedBox::default(); topology.len()];
+                bound_in_order(&items, &topology, &mut boxes);
+                let mut found = boxes.clone();
+                principal_axes(&points, &topology, &mut found, (&mut Vec::new(), &mut Vec::new()));
+                for (id, (expected, found)) in boxes.iter().zip(&found).enumerate() {
+                    // Axes of equal variance are arbitrary; the variances along them are not.
+                    let variance = |axis: [f32; 3]| {
+                        let own = &points[topology.points(NodeId(id32(id)))];
+                        let along = |p: &[f32; 3]| (0..3).map(|k| f64::from(p[k]) * f64::from(axis[k])).sum();
+                        let values: Vec<f64> = own.iter().map(along).collect();
+                        let mean = values.iter().sum::<f64>() / values.len() as f64;
+                        values.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
+                    };
+                    let all: f64 = expected.axes.map(variance).iter().sum();
+                    for k in 0..3 {
+                        let (a, b) = (variance(expected.axes[k]), variance(found.axes[k]));
+                        assert!((a - b).abs() <= 1e-5 * all, "{kind:?}, node {id}: {a}, {b}");
+                    }
+                }
+            }
+        }
+    }
+}
