@@ -195,9 +195,9 @@ fn sentence(answer: &RayAnswer, unit: f64) -> String {
 const RAY_LINE: &str =
     r#"a line is {"origin":[x,y,z],"direction":[x,y,z]}, with "max":d and "radius":r if wanted"#;
 
-/// A line of a file of rays. Other fields are ignored.
+/// A line of a file of rays. It may have no other fields, since a misspelt radius would be none.
 #[derive(Debug, Deserialize)]
-#[serde(expecting = "an object")]
+#[serde(deny_unknown_fields, expecting = "an object")]
 struct RayLine {
     origin: [f64; 3],
     direction: [f64; 3],

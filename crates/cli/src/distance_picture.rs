@@ -35,7 +35,7 @@ pub(crate) fn paint_distance(views: [&Placed<'_>; 2], found: &Distance, style: &
     } else {
         "They touch at the marked point.".to_owned()
     };
-    let told = if style.points {
+    let told = if style.points || found.lower > 0.0 {
         told
     } else {
         format!("{told} Gaps below {} cannot be distinguished from contact.", style.unit.length(found.band))

@@ -39,7 +39,7 @@ pub enum ReadError {
     /// Neither the content nor the name identifies the format.
     #[error(
         "{}: expected ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off or gltf, got an \
-         unknown format; name the format with `--format`",
+         unknown format; if it is one of these, name it with `preprocess --format`",
         .path.display()
     )]
     UnknownFormat {

@@ -13,12 +13,14 @@ use crate::input::TextLines;
 use crate::matrix::PoseRefused;
 
 /// The form of a line, for messages.
-const SHAPE_LINE: &str = r#"a line is {"sphere":{"centre":[x,y,z],"radius":r}}, {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}, {"box":{"pose":[16 numbers],"half":[x,y,z]}}, {"cylinder":{"pose":[16 numbers],"half_height":h,"radius":r}}, {"cone":{"pose":[16 numbers],"half_height":h,"radius":r}}, {"hull":{"points":[[x,y,z],…]}}, {"triangle":{"points":[[x,y,z],[x,y,z],[x,y,z]]}} or {"segment":{"points":[[x,y,z],[x,y,z]]}}"#;
+const SHAPE_LINE: &str =
+    r#"a line is like {"sphere":{"centre":[x,y,z],"radius":r}}; `touch --help` shows all shapes"#;
 
 /// The names of the shapes.
 const SHAPES: [&str; 8] = ["sphere", "capsule", "box", "cylinder", "cone", "hull", "triangle", "segment"];
 
-/// A line of a file of shapes, which holds one shape. Other fields are ignored.
+/// A line of a file of shapes, which holds one shape. Other fields of the line are ignored; a shape may
+/// have no others, since a misspelt radius would be none.
 #[derive(Debug, Deserialize)]
 #[serde(expecting = "an object")]
 struct ShapeLine {
@@ -35,6 +37,7 @@ struct ShapeLine {
 }
 
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct SphereLine {
     #[serde(alias = "center")]
     centre: [f64; 3],
@@ -42,21 +45,24 @@ struct SphereLine {
 }
 
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct CapsuleLine {
     ends: [[f64; 3]; 2],
     radius: f64,
 }
 
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct BoxLine {
     pose: [f64; 16],
     half: [f64; 3],
-    #[serde(default)]
+    #[serde(default, alias = "rounding")]
     radius: f64,
 }
 
 /// A cylinder or a cone.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct RoundLine {
     pose: [f64; 16],
     half_height: f64,
@@ -66,6 +72,7 @@ struct RoundLine {
 }
 
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct HullLine {
     points: Vec<[f64; 3]>,
     #[serde(default)]
@@ -73,6 +80,7 @@ struct HullLine {
 }
 
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct TriangleLine {
     points: [[f64; 3]; 3],
     #[serde(default)]
@@ -80,6 +88,7 @@ struct TriangleLine {
 }
 
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct SegmentLine {
     points: [[f64; 3]; 2],
     #[serde(default)]

@@ -49,6 +49,10 @@ fn what_is_no_shape_is_refused_with_its_line() {
         (r#"{"sphere":{"centre":[0,0,0],"radius":-1}}"#, &["line 2", "`radius`, got -1"][..]),
         (r#"{"sphere":{"centre":[0,0],"radius":1}}"#, &["line 2", "column"]),
         (r#"{"sphere":{"centre":[0,0,0]}}"#, &["line 2", "radius"]),
+        (
+            r#"{"box":{"pose":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1],"radios":1}}"#,
+            &["line 2", "unknown field `radios`"],
+        ),
         (r#"{"prism":{}}"#, &["line 2", "unknown shape `prism`; known: sphere, capsule, box, cylinder"]),
         (r#"{"cone":{}}"#, &["line 2", "pose"]),
         (r#"{"hull":{"points":[]}}"#, &["line 2", "at least one point in `points`"]),

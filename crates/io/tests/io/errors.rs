@@ -56,7 +56,7 @@ fn formats_that_are_none_of_ours() {
         "some words\n",
         "notes.md",
         "notes.md: expected ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off or gltf, got an \
-         unknown format; name the format with `--format`",
+         unknown format; if it is one of these, name it with `preprocess --format`",
     );
     says(
         "PK\u{3}\u{4}...",

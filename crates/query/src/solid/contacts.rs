@@ -71,14 +71,14 @@ pub(crate) fn contacts(
 ) {
     contacts.clear();
     found.clear();
+    let own = hint.as_deref().and_then(|hint| hint.centre);
+    let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
     if let Some(solid) = solid {
         let mut near = Near::new(elements, solid, false);
         near.limit(elements.margin);
         let centre = near.lane_box.centre;
         let is_oriented = elements.placed.scan().is_oriented();
-        let own = hint.as_deref().and_then(|hint| hint.centre);
-        let inside =
-            own.map_or(solid.inside, |own| elements.placed.stored_to_world().apply_inverse(own).into());
+        let inside = own.unwrap_or(solid.inside);
         let mut search = Gather { near, hint: hint.as_deref(), inside, is_oriented, found };
         // The visitor never breaks.
         let _whole = elements.arrays.tree.descend_to(level, centre, &mut search);
@@ -102,9 +102,10 @@ pub(crate) fn contacts(
     }
     let is_refined = elements.plan.options().detail == Detail::Witness && elements.placed.verifies();
     if let Some(solid) = solid.filter(|_| is_refined) {
+        let inside = own.unwrap_or(solid.inside);
         for (n, (contact, i)) in contacts.iter_mut().zip(points).enumerate() {
             if elements.is_disc(i) && elements.placed.scan().kind(i) != PointKind::Edge {
-                refine(elements, solid, (i, if n == 0 { SLIDES } else { 0 }), contact, scratch);
+                refine(elements, (solid, &inside), (i, if n == 0 { SLIDES } else { 0 }), contact, scratch);
             }
         }
         let deepest = (0..contacts.len()).max_by(|&a, &b| contacts[a].depth.total_cmp(&contacts[b].depth));
@@ -148,10 +149,11 @@ fn select(found: &[Candidate], hint: Option<&ShapeHint>, taken: &[ShapeContact])
 
 /// Moves a contact from the tangent disc of point `i` onto the surface, with one evaluation. The deepest
 /// contact of the disc also moves over the surface to where that is nearest to the shape, with up to
-/// `slides` more.
+/// `slides` more. Leaves the contact on its disc where the surface turns away from the disc by more than
+/// 60°, or `inside` is on another side of it: in noise, or beside another sheet.
 fn refine(
     elements: &Elements<'_>,
-    solid: &Solid<'_>,
+    (solid, inside): (&Solid<'_>, &Vector),
     (i, slides): (usize, u32),
     contact: &mut ShapeContact,
     scratch: &mut ViewScratch,
@@ -160,6 +162,8 @@ fn refine(
     const NEAR: f64 = 0.05;
     /// A place of the surface, as a disc, in disc radii.
     const PLACE: f64 = 0.01;
+    /// The cosine of the greatest angle between the surface and the disc.
+    const TURN: f64 = 0.5;
     let (placed, band) = (&elements.placed, elements.band(i));
     let frame = placed.stored_to_world();
     let radius = f64::from(elements.arrays.discs.get(i));
@@ -167,6 +171,8 @@ fn refine(
         of_disc(solid, &solid.gap(&disc, f64::INFINITY), &disc, (disc.normal, false, elements.margin))
     };
     let (mut x, own) = (contact.point, Vector::from(contact.normal));
+    let is_before =
+        own.dot(&(Vector::from(placed.stored_to_world().apply((*inside).into())) - Vector::from(x))) >= 0.0;
     let mut slides = slides;
     loop {
         let at = placed.evaluate_near(i, x, scratch);
@@ -181,6 +187,10 @@ fn refine(
             normal: frame.rotate_inverse((upright * 1.0_f64.copysign(upright.dot(&own))).into()).into(),
             radius,
         };
+        let stays = disc.normal.dot(&(inside - disc.centre)) >= 0.0;
+        if upright.dot(&own).abs() < TURN || stays != is_before {
+            return;
+        }
         if slides > 0
             && let Some((point, ..)) = deepest(disc)
             && (point - disc.centre).norm() > NEAR * radius

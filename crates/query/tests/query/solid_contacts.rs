@@ -6,7 +6,7 @@ use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
     CollideOptions, Detail, Evidence, Placed, Ray, Scratch, Shape, ShapeContact, ShapeHint, ShapePlan, Target,
 };
-use nearmiss_testdata::arbitrary::{rng, unit_vector};
+use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::shapes::{self, Form, Order, Sampling};
 use rand::RngExt;
 
@@ -287,4 +287,34 @@ fn rays_hit_closed_surfaces_where_they_are() {
         let answer = target.cast(&beside, &mut scratch);
         assert!(answer.hit.is_none() && format!("{answer:?}").contains("Certified"), "{answer:?}");
     }
+}
+
+#[test]
+fn no_ball_is_pushed_through_a_rough_surface() {
+    let mut random = rng(8);
+    let mut deep = 0;
+    for noise in [0.2, 0.6] {
+        let scan = scanned(shapes::torus(1.0, 0.35), 0.04, noise);
+        let target = target(&scan, &CollideOptions::default());
+        let (mut contacts, mut scratch) = (Vec::new(), Scratch::default());
+        for _ in 0..1500 {
+            let centre = point_in(&mut random, 1.4);
+            let radius = random.random_range(0.05..0.3);
+            target.contacts(&Shape::Sphere { centre, radius }, &mut contacts, &mut scratch);
+            for contact in &contacts {
+                let to_centre: [f64; 3] = [0, 1, 2].map(|k| centre[k] - contact.point[k]);
+                let height: f64 = (0..3).map(|k| to_centre[k] * contact.normal[k]).sum();
+                assert!(
+                    height > -1e-6,
+                    "the normal {:?} of {contact:?} leaves the centre behind",
+                    contact.normal
+                );
+                // A ball about a point that samples no sheet adds its own radius.
+                let most = radius + 0.15;
+                assert!(contact.depth <= most, "{} deep, of a ball of radius {radius}", contact.depth);
+                deep += u32::from(contact.depth > 0.01);
+            }
+        }
+    }
+    assert!(deep > 1000, "{deep} deep contacts");
 }
