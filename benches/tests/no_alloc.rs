@@ -182,6 +182,13 @@ fn warm_queries_and_evaluations_allocate_nothing() {
             target.cast_all(&ray, &mut hits, &mut scratch);
             sum += hits.len() + usize::from(target.cast(&ray, &mut scratch).hit.is_some());
         }
+        let target = Target::new(scan.at(&Pose::IDENTITY), &shapes[0]);
+        let ball = Shape::Sphere { centre: [0.0; 3], radius: object.r };
+        sum += paths
+            .iter()
+            .map(|path| target.sweep(&ball, path, &mut scratch).distances as usize)
+            .sum::<usize>();
+        sum += usize::from(ball.gap_to(&ball).is_some());
         hint.clear();
         sum
     };

@@ -47,6 +47,7 @@ pub struct CastArgs {
     #[arg(
         long,
         value_name = "X,Y,Z",
+        value_parser = parse_place,
         allow_hyphen_values = true,
         requires = "image",
         help_heading = "Depth image"
@@ -56,6 +57,7 @@ pub struct CastArgs {
     #[arg(
         long,
         value_name = "X,Y,Z",
+        value_parser = parse_place,
         allow_hyphen_values = true,
         requires = "image",
         help_heading = "Depth image"
