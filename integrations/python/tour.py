@@ -39,7 +39,8 @@ target = scan.target()
 middle = scan.bounds.mean(axis=0)
 ball = Shape.sphere(middle, 0.3 * size)
 print(target.touch(ball), target.distance(ball), target.contacts(ball)["depth"])
-rays = target.cast_each(rng.uniform(*scan.bounds, size=(1000, 3)) + [0, 0, size], [0, 0, -1])
+low, high = scan.bounds
+rays = target.cast_each(rng.uniform(low, high, size=(1000, 3)) + [0, 0, size], [0, 0, -1])
 print(rays["hit"].mean(), "of the rays from above hit; the highest place is", rays["point"][rays["hit"], 2].max())
 
 # A whole motion: free, or the first impact.

@@ -10,6 +10,9 @@ use crate::repository::{Outcome, root, run as run_command, run_cargo};
 /// Poses on which the C library is compared with the command line.
 const POSES: &str = "500";
 
+/// The greatest difference of lengths of a scan of size 0.2 by the rounding of poses.
+const ROUNDING: f64 = 1e-9;
+
 /// Options of every C and C++ compiler.
 const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-g"];
 
@@ -135,7 +138,8 @@ fn output(command: &mut Command, name: &str, input: &[u8]) -> Outcome<String> {
     Ok(String::from_utf8(output.stdout)?)
 }
 
-/// Checks that the C library answers as the command line does, to the last bit.
+/// Checks that the C library answers as the command line does. The command line makes a matrix of a
+/// pose first, which rounds it: verdicts and evidence are the same, numbers up to [`ROUNDING`].
 fn agree(built: &Path, work: &Path) -> Outcome {
     let command_line = built.join(format!("nearmiss{}", std::env::consts::EXE_SUFFIX));
     let told =
@@ -196,7 +200,7 @@ fn agree(built: &Path, work: &Path) -> Outcome {
             number(&apart["upper"]),
         ];
         let got: Vec<f64> = line.split(' ').map(str::parse).collect::<Result<_, _>>()?;
-        let same = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
+        let same = |(a, b): (&f64, &f64)| (a - b).abs() <= ROUNDING || (a.is_nan() && b.is_nan());
         if got.len() != expected.len() || !expected.iter().zip(&got).all(same) {
             return Err(format!(
                 "pose {compared}: expected {expected:?} as the command line says, got {got:?}"
