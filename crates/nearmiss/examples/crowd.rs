@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{} capsules, {height} high, on {} points", walkers.len(), scan.len());
 
     let (mut contacts, mut total, mut longest) = (Vec::new(), Duration::ZERO, Duration::ZERO);
-    for step in 0..STEPS as usize {
+    for (step, _) in (0..STEPS).enumerate() {
         let start = Instant::now();
         for (number, walker) in walkers.iter_mut().enumerate() {
             if (number + step).is_multiple_of(LOOK) && !walker.sees_floor(&target, height, &mut scratch) {

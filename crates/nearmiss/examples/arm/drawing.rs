@@ -23,7 +23,7 @@ pub(crate) fn svg(
 ) -> Result<String, Error> {
     let mut out = String::new();
     let (wide, tall) = (2.0 * SIZE + 30.0, SIZE + 80.0);
-    writeln!(out, r##"<svg xmlns="http://www.w3.org/2000/svg" width="{wide}" height="{tall}">"##)?;
+    writeln!(out, r#"<svg xmlns="http://www.w3.org/2000/svg" width="{wide}" height="{tall}">"#)?;
     writeln!(out, r##"<rect width="100%" height="100%" fill="#ffffff"/>"##)?;
     let highest = moments.iter().map(|(_, apart)| *apart).fold(f64::MIN_POSITIVE, f64::max);
     // Nearest last, so that it is on top.

@@ -170,8 +170,8 @@ impl<'a> Solid<'a> {
         }
     }
 
-    /// The lowest place of a box over a disc, if no corner below all others is. It is then above the rim:
-    /// on an edge, or where a face that looks down is lowest.
+    /// The lowest place of a box over a disc that its lowest corner is beside of: above the rim, on an
+    /// edge, or where a face that looks down is lowest.
     fn lowest_of_box(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
         /// Slopes below this are level.
         const LEVEL: f64 = 1e-12;

@@ -377,7 +377,11 @@ fn bodies_left_out_for_a_shape_do_not_touch_it() {
 fn each_pair_has_its_own_reach() {
     let (world, placed) = crowd(60);
     // Bodies of one group are no pair; the others have a margin by their ids.
-    let reach_of = |a: BodyId, b: BodyId| (a.0 % 3 != b.0 % 3).then(|| 0.4 * ((a.0 + b.0) % 5) as f64);
+    let reaches = [0.0, 0.4, 0.8, 1.2, 1.6];
+    let reach_of = |a: BodyId, b: BodyId| {
+        let kind = usize::try_from((a.0 + b.0) % 5).unwrap();
+        (a.0 % 3 != b.0 % 3).then(|| reaches[kind])
+    };
     let (mut pairs, mut expected, mut near) = (Vec::new(), Vec::new(), Vec::new());
     for (i, (a, ..)) in placed.iter().enumerate() {
         for (b, ..) in &placed[i + 1..] {
