@@ -101,7 +101,7 @@ fn depth_frame(width: u32, height: u32, time: f64, seed: u64) -> Vec<[f64; 3]> {
         let root = dc * dc - dd * cc;
         let depth = if root > 0.0 { (dc - root.sqrt()) / dd } else { 3.0 };
         let noise = unit_vector(rng)[0];
-        let hole = i % 53 == 0 || (i % width / 8 == 2 && i / width / 8 == 3);
+        let hole = i.is_multiple_of(53) || (i % width / 8 == 2 && i / width / 8 == 3);
         if hole { [f64::NAN; 3] } else { d.map(|x| x * depth * (1.0 + 2e-4 * noise)) }
     };
     (0..width * height).map(&mut pixel).collect()
