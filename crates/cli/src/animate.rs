@@ -108,16 +108,17 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), CliError> {
         (None, None) => Partner::Nothing,
     };
     let following = if is_kinetic(args, &frames, partner, console)? { None } else { args.method.following() };
-    let mut told = Told { args, results: Results::new(), summary: Summary::default(), moments: Vec::new() };
+    let mut told = Told::new(args);
+    let times = times(args.rate, frames.last());
     match following {
-        None => told.follow_events(&frames, partner)?,
-        Some(following) => told.follow_frames(&frames, partner, following)?,
+        None => told.follow_events(&frames, partner, times)?,
+        Some(following) => told.follow_frames(&frames, partner, following, times)?,
     }
     told.finish(&frames, partner, console)
 }
 
-/// Returns `true` if kinetic trees follow the motion: if they are asked for, or by default if they take
-/// less time than refitting.
+/// Returns `true` if kinetic trees follow the motion: if they are asked for, or by default if a trial of
+/// both shows that they take less time than refitting. Verdicts are the same.
 fn is_kinetic(
     args: &AnimateArgs,
     frames: &Frames,
@@ -136,13 +137,26 @@ fn is_kinetic(
     if !are_meshes || args.rate < OFTEN || frames.len() < 2 {
         return Ok(false);
     }
-    let crossover = KineticMeshes::new(frames, partner)?.crossover()?;
+    // From the first file to the second, the knot between them included.
+    let mut meshes = KineticMeshes::new(frames, partner)?;
+    let kinetic = meshes.at(1.0)?;
+    let mut refitting = Told { is_quiet: true, ..Told::new(args) };
+    let moments = [0.0, 1.0 / args.rate].into_iter();
+    refitting.follow_frames(frames, partner, Following::Refit, moments)?;
+    let [refit, asked] = refitting.summary.last();
+    // Moving by events takes a time for each second, everything else for each query time.
+    let saved = refit + asked - kinetic.query_micros;
+    let crossover = if saved > 0.0 { kinetic.update_micros / saved } else { f64::INFINITY };
     let is_kinetic = args.rate > crossover;
     console.note(format_args!(
-        "{} at {} query times a second: kinetic trees take less time from about {} on",
+        "{} at {} query times a second; kinetic trees take less time {}",
         if is_kinetic { "kinetic trees" } else { "refitting" },
         short(args.rate),
-        short(crossover)
+        if crossover.is_finite() {
+            format!("from about {} on", short(crossover))
+        } else {
+            "at no rate".into()
+        }
     ));
     Ok(is_kinetic)
 }
@@ -154,13 +168,30 @@ struct Told<'a> {
     summary: Summary,
     /// The query times, if they are shown later.
     moments: Vec<Moment>,
+    /// `true` for a trial, about which nothing is told.
+    is_quiet: bool,
 }
 
-impl Told<'_> {
+impl<'a> Told<'a> {
+    fn new(args: &'a AnimateArgs) -> Self {
+        Self {
+            args,
+            results: Results::new(),
+            summary: Summary::default(),
+            moments: Vec::new(),
+            is_quiet: false,
+        }
+    }
+
     /// Moves two meshes through all query times by events.
-    fn follow_events(&mut self, frames: &Frames, partner: Partner<'_>) -> Result<(), CliError> {
+    fn follow_events(
+        &mut self,
+        frames: &Frames,
+        partner: Partner<'_>,
+        mut times: impl Iterator<Item = f64>,
+    ) -> Result<(), CliError> {
         let mut meshes = KineticMeshes::new(frames, partner)?;
-        times(self.args.rate, frames.last()).try_for_each(|t| {
+        times.try_for_each(|t| {
             let moment = meshes.at(t)?;
             self.tell(moment)
         })
@@ -172,12 +203,13 @@ impl Told<'_> {
         frames: &Frames,
         partner: Partner<'_>,
         following: Following,
+        times: impl Iterator<Item = f64>,
     ) -> Result<(), CliError> {
         let pool = pool(self.args.threads.unwrap_or(0))?;
         let mut body = Body::first(frames)?;
         let mut other = partner.frames().map(Body::first).transpose()?;
         let (mut asking, mut vertices) = (Asking::default(), Vec::new());
-        for t in times(self.args.rate, frames.last()) {
+        for t in times {
             let (mut bv_updates, mut rebuilt, mut update_micros) = (0, 0, 0.0);
             for (body, frames) in [(Some(&mut body), Some(frames)), (other.as_mut(), partner.frames())] {
                 let (Some(body), Some(frames)) = (body, frames) else { continue };
@@ -203,6 +235,9 @@ impl Told<'_> {
 
     fn tell(&mut self, moment: Moment) -> Result<(), CliError> {
         self.summary.add(&moment);
+        if self.is_quiet {
+            return Ok(());
+        }
         if self.args.image.is_some() || self.args.html.is_some() {
             self.moments.push(moment);
         }

@@ -8,4 +8,5 @@ pub(crate) mod extents;
 pub(crate) mod parts;
 pub(crate) mod pixels;
 pub(crate) mod samples;
+pub(crate) mod sectors;
 pub(crate) mod surfels;

@@ -1,6 +1,12 @@
 //! The time that a question takes by parry's traits beside that of nearmiss alone, in nanoseconds:
 //! `cargo run --release -p nearmiss-parry --example overhead`.
 
+#![expect(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "a program may print and read the clock"
+)]
+
 use std::hint::black_box;
 use std::time::Instant;
 

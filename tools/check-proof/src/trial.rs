@@ -120,7 +120,7 @@ fn what_the_search_proves_about_moved_frames_holds() {
     let depth = |i: u32| {
         let [u, v] = [f64::from(i % 64) - 31.5, f64::from(i / 64) - 23.5];
         let z = if u * u + v * v < 180.0 { 1.4 } else { 2.0 + 0.004 * u };
-        if i % 97 == 0 { [f64::NAN; 3] } else { [u * z / 60.0, v * z / 60.0, z] }
+        if i.is_multiple_of(97) { [f64::NAN; 3] } else { [u * z / 60.0, v * z / 60.0, z] }
     };
     scan.replace_organised(&(0..64 * 48).map(depth).collect::<Vec<_>>(), 64).unwrap();
     trials.push(("a depth frame", Trial::of(&scan.still(), "0", &[0.1, 1.5, 3.0, 4.0])));

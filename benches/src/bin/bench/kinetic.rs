@@ -231,7 +231,7 @@ fn plots(options: &Options, path: &Path) -> Result<(), Failure> {
     );
     println!("| --: |{}", " --: |".repeat(6));
     let seconds = times[times.len() - 1];
-    for rate in [15_u32, 30, 60, 120, 240, 480, 960] {
+    for rate in [15_u32, 30, 60, 120, 240, 480, 960, 1920, 3840] {
         let mut tree = start.clone();
         let (mut own, mut asked, mut refit) = (0.0, 0.0, f64::INFINITY);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of frames")]

@@ -98,16 +98,17 @@ pub(super) fn paint(
         shot.body.paint(&mut canvas, &camera, shot.colour(greatest));
         title(&mut canvas, area, &format!("{} s: {}", short(shot.t), shot.words));
     }
-    let far = format!("{} apart or more", short(greatest));
+    let far =
+        if greatest.is_finite() { format!("{} apart", short(greatest)) } else { "not in contact".to_owned() };
     let entries = [
         (Some(CLEARANCE[0]), "in contact"),
         (Some(CLEARANCE[2]), far.as_str()),
         (Some(UNTESTED), "not tested"),
         (Some(OF_PARTNER), "partner"),
     ];
-    let is_shown = [greatest >= 0.0, greatest > 0.0, false, shots.iter().any(|shot| shot.partner.is_some())];
     let is_tested = shots.iter().any(|shot| shot.clearance.is_some());
-    let shown = [is_shown[0] && is_tested, is_shown[1], !is_tested, is_shown[3]];
+    let has_partner = shots.iter().any(|shot| shot.partner.is_some());
+    let shown = [is_tested, greatest > 0.0, !is_tested, has_partner];
     let entries: Vec<_> =
         entries.into_iter().zip(shown).filter(|(_, shown)| *shown).map(|(e, _)| e).collect();
     legend::entries(&mut canvas, [GAP, strip + GAP / 2], width - 2 * GAP, &entries);

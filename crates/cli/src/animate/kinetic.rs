@@ -11,12 +11,6 @@ use crate::console::now;
 use crate::error::CliError;
 use crate::mesh::two_meshes::micros_since;
 
-/// Times on one core in nanoseconds, as `bench kinetic` and `bench moving` measured them: of an event,
-/// of a certificate that is computed, and of a refit for each kinetic node. Only their ratios matter.
-const EVENT: f64 = 250.0;
-const CERTIFICATE: f64 = 60.0;
-const REFIT: f64 = 90.0;
-
 /// Two meshes whose boxes are kinetic, and the pairs of boxes that are apart.
 pub(super) struct KineticMeshes {
     trees: [KineticTree; 2],
@@ -34,23 +28,6 @@ impl KineticMeshes {
         let mut meshes = Self { trees: [of_frames(frames)?, other], list: SeparationList::new() };
         meshes.advance(0.0)?;
         Ok(meshes)
-    }
-
-    /// Returns the rate, in query times a second, from which kinetic trees take less time than
-    /// refitting. The events and certificates from the first file to the second are counted, those of
-    /// the knot between them included, and taken for those of every second.
-    pub(super) fn crossover(mut self) -> Result<f64, CliError> {
-        let certificates =
-            |meshes: &Self| meshes.trees.iter().map(|tree| tree.counts().certificates).sum::<u64>();
-        let (before, first) = (self.work(), certificates(&self));
-        self.advance(1.0)?;
-        let [_, events] = [0, 1].map(|k| self.work()[k] - before[k]);
-        #[expect(clippy::cast_precision_loss, reason = "an estimate")]
-        let kinetic = EVENT * events as f64 + CERTIFICATE * (certificates(&self) - first) as f64;
-        let nodes: usize = self.trees.iter().map(KineticTree::node_count).sum();
-        #[expect(clippy::cast_precision_loss, reason = "an estimate")]
-        let refit = REFIT * nodes.max(1) as f64;
-        Ok(kinetic / refit)
     }
 
     /// Moves both meshes to time `t`, and tests the triangles of leaves that meet.

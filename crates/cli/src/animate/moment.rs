@@ -73,6 +73,11 @@ impl Summary {
         self.queries.push(moment.query_micros as f32);
     }
 
+    /// Returns the times in microseconds that the last update and the last query took.
+    pub(super) fn last(&self) -> [f64; 2] {
+        [&self.updates, &self.queries].map(|times| times.last().map_or(0.0, |micros| f64::from(*micros)))
+    }
+
     pub(super) fn text(&self) -> String {
         let times = count(self.updates.len() as u64, "query time");
         let of = |word: &str| self.verdicts.iter().filter(|verdict| **verdict == word).count();

@@ -92,6 +92,8 @@ impl Plot {
         }
         let at_once = moments.len().div_ceil(COLUMNS).max(1);
         let mut line = String::new();
+        #[expect(clippy::cast_precision_loss, reason = "a count")]
+        let width = (right - left) / (moments.len() - 1).max(1) as f64 + 0.3;
         for some in moments.chunks(at_once) {
             let most = some.iter().map(|moment| (self.value)(moment)).fold(0.0, f64::max);
             let _ = write!(line, "{:.1},{:.1} ", x(some[0].t), y(most));
@@ -99,9 +101,9 @@ impl Plot {
             let _ = writeln!(
                 svg,
                 "<rect x=\"{:.1}\" y=\"{}\" width=\"{:.1}\" height=\"10\" fill=\"{}\"/>",
-                x(some[0].t) - 1.0,
+                x(some[0].t) - 0.5 * width,
                 bottom + 6.0,
-                (x(end) - x(some[0].t)).max(0.0) + 2.0,
+                (x(end) - x(some[0].t)).max(0.0) + width,
                 verdict_colour(some)
             );
         }

@@ -100,6 +100,32 @@ fn kinetic_trees_give_the_verdicts_of_refitting() {
 }
 
 #[test]
+fn pictures_and_pages_show_a_motion() {
+    let place = frames();
+    for (frames, floor, method) in [(SCAN, "floor.obj", "auto"), (MESH, "floor.obj", "kinetic")] {
+        let shown =
+            ["--against", floor, "--method", method, "--rate", "4", "--image", "a.png", "--html", "a.html"];
+        let told = place.ok(&[&["animate"], &frames[..], &shown[..]].concat());
+        assert_eq!(told.results.lines().count(), 14, "13 query times and a summary");
+        let png = std::fs::read(place.path("a.png")).unwrap();
+        assert_eq!(&png[1..4], b"PNG", "{frames:?}");
+        let page = std::fs::read_to_string(place.path("a.html")).unwrap();
+        assert_eq!(page.matches("<svg").count(), 4, "{frames:?}: updates, events, update and query time");
+        assert!(page.contains("Events") && page.contains("data:image/png;base64,"), "{frames:?}");
+    }
+    let wrong = [&["animate"], &MESH[..], &["--image", "a.jpg"]].concat();
+    place.refused(2, &wrong, &["a.jpg", ".png"]);
+    // Asked this often, both ways are tried.
+    let often = [&["animate"], &MESH[..], &["--against", "floor.obj", "--rate", "40"]].concat();
+    let told = place.ok(&often);
+    assert!(
+        told.errors.contains("at 40 query times a second; kinetic trees take less time"),
+        "{}",
+        told.errors
+    );
+}
+
+#[test]
 fn motions_without_a_partner_are_told_and_summed_up() {
     let place = frames();
     let told = place.ok(&[&["animate"], &MESH[..], &["--json"]].concat()).json();

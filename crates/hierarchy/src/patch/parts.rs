@@ -127,14 +127,14 @@ fn about(
     let mut reach = 0.0_f32;
     for (bounds, growths) in boxes.iter().zip(growths) {
         reach = reach.max(bounds.reach);
+        // All three have the same axes.
         let solids = [*bounds, growths[0].of(bounds), growths[1].of(bounds)];
-        for (span, solid) in spans.iter_mut().zip(solids) {
-            for k in 0..3 {
-                let [u, v, w] = solid.axes;
-                let [x, y, z] = solid.half;
+        let [u, v, w] = bounds.axes;
+        for k in 0..3 {
+            let (x, y, z) = (dot(axes[k], u).abs(), dot(axes[k], v).abs(), dot(axes[k], w).abs());
+            for (span, solid) in spans.iter_mut().zip(&solids) {
                 let middle = dot(axes[k], solid.centre);
-                let spread =
-                    x * dot(axes[k], u).abs() + y * dot(axes[k], v).abs() + z * dot(axes[k], w).abs();
+                let spread = x * solid.half[0] + y * solid.half[1] + z * solid.half[2];
                 span[0][k] = span[0][k].min(middle - spread);
                 span[1][k] = span[1][k].max(middle + spread);
             }

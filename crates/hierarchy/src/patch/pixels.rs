@@ -10,7 +10,8 @@ use nearmiss_lanes::wide::{Bits, Vectors, product};
 use nearmiss_surface::{Moments, SideBySide, SurfacePlan};
 
 use crate::patch::classes::corrected;
-use crate::patch::surfels::{Fit, Taken, fitted};
+use crate::patch::sectors::Taken;
+use crate::patch::surfels::{Fit, fitted};
 use crate::point::disc::PointCode;
 use crate::point::kind::PointKind;
 use crate::point::raster::{Pixel, Raster, Sixteen, WIDTH};

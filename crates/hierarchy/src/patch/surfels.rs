@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::{chunks, collect_into, in_order};
@@ -21,15 +21,12 @@ use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, St
 use crate::bounds::boxes::OrientedBox;
 use crate::patch::covering::Solid;
 use crate::patch::enclosure::{Cell, LeafBounds, Sides, Surroundings};
+use crate::patch::sectors::Taken;
 use crate::point::disc::PointCode;
 use crate::point::gather::{GROWN, Index};
 use crate::point::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
 use crate::point::neighbours::Locality;
 use crate::point::spacing::{Look, Spacing};
-
-/// The number of sectors of the tangent plane. They have equal shares of the perimeter of a
-/// diamond, so they are 11 to 18 degrees wide.
-const SECTORS: u32 = 24;
 
 /// If λ2 < 0.05 λ3 the neighbourhood is a line, and its normal is any direction across.
 const LINE: f64 = 0.05;
@@ -400,75 +397,6 @@ fn widest_gap<'a, S: Simd>(
         taken.add(simd, support_radius, product(d, d), [along(d, axes.0), along(d, axes.1)]);
     }
     taken.widest_gap()
-}
-
-/// The sectors of the tangent plane of a point with points that support it, as bits, in lanes.
-pub(crate) struct Taken<S: Simd>(i32x16<S>);
-
-impl<S: Simd> Taken<S> {
-    #[inline(always)]
-    pub(crate) fn new(simd: S) -> Self {
-        Self(i32x16::splat(simd, 0))
-    }
-
-    /// Adds those of sixteen points that have the point within their support radius. `d_sq` are their
-    /// squared distances from it, `x` and `y` their coordinates in its tangent plane.
-    #[inline(always)]
-    pub(crate) fn add(
-        &mut self,
-        simd: S,
-        support_radius: f32x16<S>,
-        d_sq: f32x16<S>,
-        [x, y]: [f32x16<S>; 2],
-    ) {
-        let length = x.abs() + y.abs();
-        // The angle on the diamond |x| + |y| = 1, from 0 to 4, one for each quarter turn, without
-        // trigonometry.
-        let share = x / length;
-        let quarter = simd.select_f32x16(y.simd_ge(0.0), -(share - 1.0), share + 3.0);
-        let turn = quarter * (SECTORS as f32 / 4.0);
-        let sector = simd.select_f32x16(turn.simd_lt(SECTORS as f32), turn, f32x16::splat(simd, 0.0));
-        let counts: mask32x16<S> = d_sq.simd_lt(support_radius * support_radius) & length.simd_gt(0.0);
-        self.0 |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
-    }
-
-    /// Returns the greatest number of adjacent sectors without a point.
-    #[inline(always)]
-    fn widest_gap(self) -> u32 {
-        widest_gap_beside(self.0.to_array().into_iter().fold(0, |all, bits| all | bits))
-    }
-
-    /// Returns the same for each lane alone, where each has a point of its own.
-    #[inline(always)]
-    pub(crate) fn gaps(self) -> [u32; 16] {
-        self.0.to_array().map(widest_gap_beside)
-    }
-}
-
-/// Returns the greatest number of adjacent sectors beside those `taken`.
-#[inline(always)]
-fn widest_gap_beside(taken: i32) -> u32 {
-    let taken = u64::from(taken.cast_unsigned());
-    // Repeated, so that a run across the start counts whole.
-    let round = taken | taken << SECTORS;
-    // After k steps a bit remains for each run longer than k.
-    let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
-    while runs != 0 {
-        runs &= runs >> 1;
-        widest += 1;
-    }
-    widest.min(SECTORS)
-}
-
-/// Returns the bit of each number from 0 to 30, rounded down: the power of two, made as a
-/// floating-point number.
-#[inline(always)]
-fn bit<S: Simd>(number: f32x16<S>) -> i32x16<S> {
-    const ONE: i32 = 127;
-    const DIGITS: u32 = 23;
-    let exponent = i32x16::truncate_from(number) + ONE;
-    let power: f32x16<S> = (exponent << DIGITS).bitcast();
-    i32x16::truncate_from(power)
 }
 
 fn kind(at: &Evaluation, look: Look) -> PointKind {

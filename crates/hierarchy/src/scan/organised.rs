@@ -98,40 +98,44 @@ pub(crate) fn replace_organised(
     let topology = Topology::new(id32(count), options.leaf_size);
     let dense = order(raster, fits, along, items, options.leaf_size as usize);
     split_loose(items, &topology, dense, &|leaf: &[Item]| is_loose(leaf, radii));
-
     resize(scan, topology);
-    let (items, along, radii, fits, codes): (&[Item], &[Pixel], &[f32], &[Fit], &[PointCode]) =
-        (items, along, radii, fits, codes);
-    let raster = &*raster;
-    let pixel = |i: usize| raster.number(along[items[i].index as usize]);
-    if let Some(positions) = scan.positions.get_mut() {
-        fill(positions.to_mut(), |i| items[i].position);
-    }
-    const WIDTH: usize = PointBlock::WIDTH;
-    change_each(scan.arrays.blocks.to_mut(), WIDTH, |number, block| {
-        *block = PointBlock::EMPTY;
-        for (lane, item) in items[number * WIDTH..].iter().take(WIDTH).enumerate() {
-            for k in 0..3 {
-                block.position[k][lane] = item.position[k];
-            }
-        }
-    });
-    fill(scan.arrays.source.to_mut(), |i| id32(pixel(i)));
-    fill(scan.arrays.radii.to_mut(), |i| radii[items[i].index as usize]);
-    fill(scan.arrays.codes.to_mut(), |i| codes[pixel(i)]);
-    let stored = |p: [f64; 3]| frame.to_world(frame.to_local(p));
     let meta = &mut scan.meta;
+    let stored = |p: [f64; 3]| frame.to_world(frame.to_local(p));
     meta.bounds = Aabb { min: stored(bounds.min), max: stored(bounds.max) };
     (meta.frame, meta.step, meta.reach, meta.dense) = (frame, step(&frame, &bounds), reach, id32(dense));
     meta.dropped = Dropped { not_finite: points.len() - count, duplicate: 0, filtered: 0 };
     meta.is_oriented = false;
-    set_normals(scan, |i| fits[pixel(i)].normal);
+    pixels.fill(scan);
     closing.reserve(scan);
     closing.support(scan);
     closing.turn(scan);
     closing.bound(scan);
     closing.finish(scan);
     Ok(true)
+}
+
+impl Pixels {
+    /// Sets the arrays of the points of a scan.
+    fn fill(&self, scan: &mut PointHierarchy) {
+        const WIDTH: usize = PointBlock::WIDTH;
+        let Self { raster, fits, codes, along, radii, items, .. } = self;
+        let pixel = |i: usize| raster.number(along[items[i].index as usize]);
+        if let Some(positions) = scan.positions.get_mut() {
+            fill(positions.to_mut(), |i| items[i].position);
+        }
+        change_each(scan.arrays.blocks.to_mut(), WIDTH, |number, block| {
+            *block = PointBlock::EMPTY;
+            for (lane, item) in items[number * WIDTH..].iter().take(WIDTH).enumerate() {
+                for k in 0..3 {
+                    block.position[k][lane] = item.position[k];
+                }
+            }
+        });
+        fill(scan.arrays.source.to_mut(), |i| id32(pixel(i)));
+        fill(scan.arrays.radii.to_mut(), |i| radii[items[i].index as usize]);
+        fill(scan.arrays.codes.to_mut(), |i| codes[pixel(i)]);
+        set_normals(scan, |i| fits[pixel(i)].normal);
+    }
 }
 
 /// The bounds and the number of the measured points of a frame.

@@ -109,6 +109,7 @@ mod tests {
     #[test]
     fn axes_from_moments_span_boxes_as_small_as_axes_from_points() {
         for kind in [CloudKind::Sphere, CloudKind::Random, CloudKind::Lattice, CloudKind::Clustered] {
+            #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
             let points: Vec<[f32; 3]> =
                 cloud(kind, 900, 3).iter().map(|p| p.map(|x| x as f32 + 100.0)).collect();
             let items: Vec<Item> =

@@ -88,6 +88,75 @@ fn refitted_renewed_and_prepared_scans_agree_outside_the_band() {
     assert!(seen[0] >= 7 && seen[1] >= 7 && proven > 20, "{seen:?} verdicts, {proven} proven");
 }
 
+/// A wall and a ball before it, seen by a depth camera, with noise and holes.
+fn depth_frame(width: u32, height: u32, time: f64, seed: u64) -> Vec<[f64; 3]> {
+    let rng = &mut rng(seed);
+    let (focus, centre, radius) = (0.9 * f64::from(width), [0.3 * time.sin(), 0.1, 2.0], 0.4);
+    let mut pixel = |i: u32| {
+        let [u, v] =
+            [f64::from(i % width) - 0.5 * f64::from(width), f64::from(i / width) - 0.5 * f64::from(height)];
+        let d = [u / focus, v / focus, 1.0];
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (dd, dc, cc) = (dot(d, d), dot(d, centre), dot(centre, centre) - radius * radius);
+        let root = dc * dc - dd * cc;
+        let depth = if root > 0.0 { (dc - root.sqrt()) / dd } else { 3.0 };
+        let noise = unit_vector(rng)[0];
+        let hole = i.is_multiple_of(53) || (i % width / 8 == 2 && i / width / 8 == 3);
+        if hole { [f64::NAN; 3] } else { d.map(|x| x * depth * (1.0 + 2e-4 * noise)) }
+    };
+    (0..width * height).map(&mut pixel).collect()
+}
+
+#[test]
+fn replaced_depth_frames_answer_as_prepared_ones_outside_the_band() {
+    let tool = sphere(0.1).sample(Sampling::clean(0.02)).points;
+    let tool = MovingScan::new(&tool, &BuildOptions::default()).unwrap();
+    let first = ball();
+    let (mut by_pixels, mut by_points) = (
+        MovingScan::new(&first, &BuildOptions::default()).unwrap(),
+        MovingScan::new(&first, &BuildOptions::default()).unwrap(),
+    );
+    let one_thread = BuildOptions::default().with_threads(1);
+    let mut alone = MovingScan::new(&first, &one_thread).unwrap();
+    let (rng, scratch) = (&mut rng(21), &mut Scratch::default());
+    let (mut seen, mut proven) = ([0; 2], [0; 3]);
+    for step in 0..3_u8 {
+        let frame = depth_frame(120, 90, f64::from(step), step.into());
+        by_pixels.replace_organised(&frame, 120).unwrap();
+        by_points.replace(&frame).unwrap();
+        alone.replace_organised(&frame, 120).unwrap();
+        assert_eq!(alone.outline(), by_pixels.outline(), "threads change nothing");
+        let measured: Vec<[f64; 3]> = frame.iter().copied().filter(|p| p[2].is_finite()).collect();
+        let anew = MovingScan::new(&measured, &BuildOptions::default()).unwrap();
+        let r = anew.sampling_radius();
+        for k in 0..120_u32 {
+            let near = measured[(k as usize * 977) % measured.len()];
+            let away = unit_vector(rng).map(|c| c * (0.06 + 0.002 * f64::from(k)));
+            let pose = rotation(rng).with_translation([0, 1, 2].map(|i| near[i] + away[i]));
+            let mut found = Vec::new();
+            for (scan, proven) in [&by_pixels, &by_points, &anew].into_iter().zip(&mut proven) {
+                let plan = CollidePlan::new(&certified(), scan, &tool).unwrap();
+                let answer = Pair::new(scan.at(&Pose::IDENTITY), tool.at(&pose)).collide(&plan, scratch);
+                *proven += usize::from(matches!(
+                    answer.verdict,
+                    Verdict::Separated { evidence: Evidence::Certified, .. }
+                ));
+                found.push(answer.verdict.is_intersecting());
+            }
+            // The tool is a sphere: it is apart if its centre is further than its radius from all points.
+            let centre = pose.translation();
+            let sq = |p: &[f64; 3]| (0..3).map(|i| (p[i] - centre[i]).powi(2)).sum::<f64>();
+            let distance = measured.iter().map(sq).fold(f64::INFINITY, f64::min).sqrt() - 0.1;
+            if distance.abs() > 2.0 * r {
+                assert_eq!(found, [distance < 0.0; 3], "step {step}, pose {k}: {distance}");
+                seen[usize::from(distance < 0.0)] += 1;
+            }
+        }
+    }
+    assert!(seen.iter().all(|seen| *seen > 20), "{seen:?} poses apart and in contact");
+    assert!(proven[0].min(proven[1]) * 10 > proven[2] * 9, "{proven:?} separations are certified");
+}
+
 #[test]
 fn a_hint_of_an_earlier_frame_certifies_nothing() {
     let points = ball();

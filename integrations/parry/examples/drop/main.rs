@@ -3,6 +3,12 @@
 //!
 //! Prints energy, depths and the time of a step; draws the scene after 0, 0.5, 2 and 10 seconds.
 
+#![expect(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "a program may print and read the clock"
+)]
+
 mod picture;
 mod world;
 
