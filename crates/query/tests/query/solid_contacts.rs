@@ -1,6 +1,6 @@
 //! Contacts, distances and rays on scans of known surfaces, and contacts from frame to frame.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
@@ -299,7 +299,7 @@ fn no_ball_is_pushed_through_a_rough_surface() {
         let scan = scanned(shapes::torus(1.0, 0.35), 0.04, noise);
         let target = target(&scan, &CollideOptions::default());
         let is_sheet = |i: usize| matches!(scan.kind(i), PointKind::Sheet | PointKind::Edge);
-        let balls: HashSet<u64> =
+        let balls: BTreeSet<u64> =
             (0..scan.len()).filter(|&i| !is_sheet(i)).map(|i| u64::from(scan.id(i).0)).collect();
         let (mut contacts, mut scratch) = (Vec::new(), Scratch::default());
         for _ in 0..1500 {
