@@ -6,6 +6,7 @@ mod frames;
 mod kinetic;
 mod moment;
 mod page;
+mod solid;
 
 use std::path::{Path, PathBuf};
 
@@ -161,7 +162,7 @@ fn is_kinetic(
     Ok(is_kinetic)
 }
 
-/// What is told about the query times.
+/// The results about the query times.
 struct Told<'a> {
     args: &'a AnimateArgs,
     results: Results,

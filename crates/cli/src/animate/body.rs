@@ -12,8 +12,8 @@ use nearmiss::{
     MovingMesh, MovingScan, Pair, Placed, PlacedMesh, Pose, Renewal, Scan, Scratch, TriangleMesh, Verdict,
 };
 
-use super::film::Solid;
 use super::frames::Frames;
+use super::solid::Solid;
 use crate::answer_report::word;
 use crate::error::CliError;
 use crate::input::{self, Opening};
@@ -66,7 +66,7 @@ pub(super) enum Still {
     Scan(Scan),
 }
 
-/// What a body is tested against.
+/// The partner of the test of a body.
 #[derive(Clone, Copy)]
 pub(super) enum Partner<'a> {
     /// Nothing; a mesh is tested against itself.

@@ -9,9 +9,10 @@ use nearmiss_draw::picture::Picture;
 use super::body::{Asking, Body, Following, Partner};
 use super::frames::Frames;
 use super::moment::Moment;
+use super::solid::Solid;
 use crate::digits::short;
 use crate::error::CliError;
-use crate::viewpoint::{Shown, ViewArgs, stride};
+use crate::viewpoint::{Shown, ViewArgs};
 
 /// The most panels, and those in a row.
 const PANELS: usize = 8;
@@ -26,38 +27,6 @@ const UNTESTED: Colour = [74, 144, 217];
 
 /// Colours of the clearance: in contact, at half of the greatest clearance, and at the greatest.
 const CLEARANCE: [Colour; 3] = [[196, 30, 46], [240, 170, 60], [62, 150, 104]];
-
-/// The greatest radius of a disc, in fine pixels.
-const LARGEST: f64 = 10.0;
-
-/// What is seen of a body.
-pub(super) enum Solid {
-    /// Corners of triangles.
-    Triangles(Vec<[Vector3<f64>; 3]>),
-    /// The discs of points.
-    Discs(Vec<Splat>),
-}
-
-impl Shown for Solid {
-    fn points(&self) -> Vec<Vector3<f64>> {
-        match self {
-            Self::Triangles(all) => all.iter().step_by(stride(all.len())).map(|corners| corners[0]).collect(),
-            Self::Discs(all) => all.iter().step_by(stride(all.len())).map(|splat| splat.centre).collect(),
-        }
-    }
-
-    fn level_share(&self) -> f64 {
-        // Bodies that deform are seldom rooms.
-        0.0
-    }
-
-    fn centre(&self) -> Vector3<f64> {
-        let points = self.points();
-        #[expect(clippy::cast_precision_loss, reason = "a count")]
-        let count = points.len().max(1) as f64;
-        points.iter().sum::<Vector3<f64>>() / count
-    }
-}
 
 /// The bodies at one time.
 struct Shot {
@@ -173,19 +142,5 @@ impl Shot {
         let share = if clearance == 0.0 { 0.0 } else { share };
         let [contact, middle, far] = CLEARANCE;
         if share < 0.5 { blend(contact, middle, 2.0 * share) } else { blend(middle, far, 2.0 * share - 1.0) }
-    }
-}
-
-impl Solid {
-    fn paint(&self, canvas: &mut Canvas, camera: &Camera, colour: Colour) {
-        match self {
-            Self::Triangles(all) => all.iter().for_each(|corners| canvas.triangle(camera, corners, colour)),
-            Self::Discs(all) => {
-                for splat in all {
-                    let splat = Splat { radius: splat.radius.min(LARGEST / camera.scale), ..*splat };
-                    canvas.splat(camera, &splat, colour);
-                }
-            }
-        }
     }
 }

@@ -12,7 +12,7 @@ use crate::point::spacing::GROWTH;
 /// The number of pixels processed together.
 pub(crate) const WIDTH: usize = 16;
 
-/// How far the window of neighbours reaches, in pixels. A row, column or diagonal has only four of its
+/// The reach of the window of neighbours, in pixels. A row, column or diagonal has only four of its
 /// 24 neighbours, so the sixth nearest is beside the line of the others: where a surface is seen at a
 /// grazing angle, the spacing is that across lines, as for the rings of a scanner. The weights of the
 /// default surface fall to an eighth at two pixels.
@@ -30,7 +30,7 @@ pub(crate) const MOST_NEIGHBOURS: u32 = 8;
 /// The greatest number of pixels in a row or column.
 pub(crate) const MOST_PIXELS: usize = 1 << 16;
 
-/// How far the window reaches in which radii are smoothed.
+/// The reach of the window in which radii are smoothed.
 const SMOOTHING: isize = 1;
 
 /// A pixel of an image.

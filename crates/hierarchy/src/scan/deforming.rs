@@ -13,7 +13,7 @@ use crate::scan::deform_error::{DeformError, bounds_of};
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::ordered::Ordered;
 use crate::scan::organised::{Pixels, replace_organised};
-use crate::scan::points::ScanPoints;
+use crate::scan::points::{ScanPoints, step};
 use crate::scan::refit::{Memory, NextFrame, Refitted, refit};
 
 /// The greatest coordinate in units of the stored frame: beyond it, squares of squares of lengths
@@ -290,12 +290,6 @@ impl DeformingScan {
 /// Returns the areas of all boxes, in squared local radii.
 fn cost(scan: &PointHierarchy) -> f64 {
     scan.tree().area() / scan.radii().iter().map(|r| f64::from(r * r)).sum::<f64>()
-}
-
-/// Returns a bound of the change of a coordinate by rounding to single precision.
-pub(crate) fn step(frame: &Frame, bounds: &Aabb) -> f64 {
-    let far = |k: usize| (bounds.min[k] - frame.origin[k]).abs().max((bounds.max[k] - frame.origin[k]).abs());
-    0.5 * f64::from(f32::EPSILON) * (0..3).map(far).fold(0.0, f64::max)
 }
 
 /// Returns the points that a cloud dropped because they repeat others, with these others.

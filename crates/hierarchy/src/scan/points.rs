@@ -41,3 +41,9 @@ impl<'a> From<&'a PointCloud> for ScanPoints<'a> {
         }
     }
 }
+
+/// Returns a bound of the change of a coordinate by rounding to single precision.
+pub(crate) fn step(frame: &Frame, bounds: &Aabb) -> f64 {
+    let far = |k: usize| (bounds.min[k] - frame.origin[k]).abs().max((bounds.max[k] - frame.origin[k]).abs());
+    0.5 * f64::from(f32::EPSILON) * (0..3).map(far).fold(0.0, f64::max)
+}
