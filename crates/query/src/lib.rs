@@ -48,7 +48,7 @@ pub use mesh_scan::hint::MeshScanHint;
 pub use mesh_scan::pair::MeshScanPair;
 pub use mesh_scan::plan::MeshScanPlan;
 pub use mesh_scan::sweep::MeshScanSweep;
-pub use moments::Moments;
+pub use moments::SolidMoments;
 pub use motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepAnswer, SweepReason, SweepVerdict};
 pub use motion::plan::{SweepOptions, SweepPlan};
 pub use pair::cell_volume::{CellOdds, CellVolume};

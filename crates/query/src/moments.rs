@@ -9,7 +9,7 @@ use crate::target::Target;
 
 /// The moments of the solid that a closed scan encloses, for a density of one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Moments {
+pub struct SolidMoments {
     /// The volume, in cubic units of the world.
     pub volume: f64,
     /// The centre of mass, in the world.
@@ -49,7 +49,7 @@ impl Target<'_> {
     /// `None` if no line crosses the surface twice, or the pose is invalid. Costs 3 · `lines`² calls of
     /// [`Self::cast_all`].
     #[must_use]
-    pub fn moments(&self, lines: u16, scratch: &mut Scratch) -> Option<Moments> {
+    pub fn moments(&self, lines: u16, scratch: &mut Scratch) -> Option<SolidMoments> {
         let bounds = self.scan().bounds()?;
         let low = Vector3::from(bounds.min);
         let extent = Vector3::from(bounds.max) - low;
@@ -82,7 +82,7 @@ impl Target<'_> {
         let centre = first / volume;
         let about = second - centre * centre.transpose() * volume;
         let inertia = Matrix3::identity() * about.trace() - about;
-        (volume > 0.0).then(|| Moments {
+        (volume > 0.0).then(|| SolidMoments {
             volume,
             centre: centre.into(),
             // Symmetric: rows are columns.

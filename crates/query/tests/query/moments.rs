@@ -1,13 +1,13 @@
-//! Moments of scanned solids against their closed forms.
+//! SolidMoments of scanned solids against their closed forms.
 
 use std::f64::consts::PI;
 
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::{CollideOptions, Detail, Moments, Prepared, Scratch, ShapePlan, Target};
+use nearmiss_query::{CollideOptions, Detail, Prepared, Scratch, ShapePlan, SolidMoments, Target};
 use nearmiss_testdata::shapes::{Form, Order, Sampling, sphere, torus};
 
-fn moments(points: &[[f64; 3]], pose: &Pose, lines: u16) -> Option<Moments> {
+fn moments(points: &[[f64; 3]], pose: &Pose, lines: u16) -> Option<SolidMoments> {
     let cloud = PointCloud::from_positions(points).expect("points");
     let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).expect("a scan");
     let options = CollideOptions::estimated().with_detail(Detail::Verdict);
