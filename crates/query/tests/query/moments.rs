@@ -1,4 +1,4 @@
-//! SolidMoments of scanned solids against their closed forms.
+//! Moments of scanned solids against their closed forms.
 
 use std::f64::consts::PI;
 
