@@ -37,20 +37,30 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
     let r = scan.sampling_radius();
     let rng = &mut rng(11);
     let mut scratch = Scratch::default();
-    let (mut seen, mut clear, mut proven, mut queries, mut late, mut told) = ([0; 3], 0, 0, 0, 0, 0);
-    for round in 0..120_usize {
+    let (mut seen, mut clear, mut proven, mut queries, mut late) = ([0; 3], 0, 0, 0, 0);
+    for round in 0..80_usize {
         let margin = [0.0, 0.1][round % 2];
         let plan = ShapePlan::new(&CollideOptions::default().with_margin(margin), &scan).unwrap();
         let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
         let shape = shapes_of(0.15)[round % 5];
+        // Every other path stays on one side, where it is often free.
+        let side = unit_vector(rng);
         let poses: Vec<Pose> = (0..3)
-            .map(|_| rotation(rng).with_translation(unit_vector(rng).map(|x| x * rng.random_range(0.6..2.4))))
+            .map(|_| {
+                let place = if round % 4 < 2 {
+                    let (away, beside) = (rng.random_range(1.4..2.4), point_in(rng, 0.5));
+                    [0, 1, 2].map(|k| side[k] * away + beside[k])
+                } else {
+                    unit_vector(rng).map(|x| x * rng.random_range(0.6..2.4))
+                };
+                rotation(rng).with_translation(place)
+            })
             .collect();
         let motion = Motion::through(&poses).unwrap();
         let answer = target.sweep(&shape, &motion, &mut scratch);
         queries += answer.distances;
         // Brute force.
-        let steps = 1000_u32;
+        let steps = 400_u32;
         let at = |step: u32| f64::from(step) / f64::from(steps) * motion.duration();
         let mut upper = |time: f64| {
             let moved = shape.moved(&motion.at(time)).unwrap();
@@ -80,7 +90,18 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
                 // A hit between two of the times of brute force may be missed by it.
                 let error = first.map_or(0.0, |first| (t_hit - first) * way(t_hit));
                 assert!(error < r, "impact at {t_hit} instead of {first:?}");
-                told += usize::from(contact.is_some());
+                let depth = contact.depth + margin;
+                assert!(
+                    t_hit == 0.0 || depth.abs() < 0.5 * r,
+                    "{contact:?} at {t_hit}, margin {margin}, r {r}"
+                );
+                // The contact is on the surface of the torus, near the shape.
+                let p = Vector::from(contact.point);
+                let off = ((p.xy().norm() - 1.0).hypot(p.z) - 0.4).abs();
+                assert!(
+                    off < 0.5 * r && (Vector::from(contact.normal).norm() - 1.0).abs() < 1e-6,
+                    "{contact:?}"
+                );
                 late += usize::from((t_hit - t_free) * way(t_hit) > 2.0 * r);
                 seen[1] += 1;
             }
@@ -92,12 +113,11 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
             }
         }
     }
-    assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}");
+    assert!(seen[0] > 15 && seen[1] > 15, "free, impact, undecided: {seen:?}");
     assert!(proven * 100 >= clear * 95, "{proven} of {clear} motions that stay clear are proven");
-    assert!(told * 10 >= seen[1] * 9, "{told} contacts of {} impacts", seen[1]);
     // Only where a shape slides beside the scan first.
     assert!(late * 4 <= seen[1], "{late} of {} impacts long after the end of the proof", seen[1]);
-    assert!(queries < 120 * 40, "{queries} distance queries");
+    assert!(queries < 80 * 40, "{queries} distance queries");
 }
 
 #[test]
