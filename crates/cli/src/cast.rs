@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nearmiss::slices::Up;
 use nearmiss::{CollideOptions, Detail, Ray, RayAnswer, Scratch, ShapePlan, Target};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::answer_report::word;
@@ -197,7 +198,8 @@ fn sentence(answer: &RayAnswer, unit: f64) -> String {
 const RAY_LINE: &str =
     r#"a line is {"origin":[x,y,z],"direction":[x,y,z]}, with "max":d and "radius":r if wanted"#;
 
-/// A line of a file of rays. It may have no other fields, since a misspelt radius would be none.
+/// A line of a file of rays. It may have a name or an id, but no other fields, since a misspelt radius
+/// would be none.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 struct RayLine {
@@ -206,6 +208,8 @@ struct RayLine {
     max: Option<f64>,
     #[serde(default)]
     radius: f64,
+    #[serde(rename = "name", alias = "id")]
+    _name: Option<IgnoredAny>,
 }
 
 /// A file with a ray on each line.
@@ -237,7 +241,7 @@ impl RayFile {
             let what = message.split(" at line ").next().unwrap_or_default();
             self.lines.fault_on(number, format!("column {}: {what}; {RAY_LINE}", e.column()))
         })?;
-        let RayLine { origin, direction, max, radius } = line;
+        let RayLine { origin, direction, max, radius, .. } = line;
         let fault = |what: &str| Err(self.lines.fault_on(number, what));
         if direction == [0.0; 3] {
             return fault("expected a direction with a length above zero in `direction`, got [0, 0, 0]");

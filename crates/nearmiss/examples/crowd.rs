@@ -5,11 +5,7 @@
 //!
 //! Each capsule falls and walks ahead, and is pushed out along the normals of its contacts. Some times a
 //! second it looks ahead by a ray, and turns where there is no floor. Where it is blocked it turns, too.
-#![expect(
-    clippy::print_stdout,
-    clippy::disallowed_methods,
-    reason = "a program for people, which times itself"
-)]
+#![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "a program for people, with a clock")]
 
 use std::error::Error;
 use std::f64::consts::TAU;

@@ -16,9 +16,10 @@ pub struct SolidMoments {
     pub centre: [f64; 3],
     /// The inertia tensor about the centre of mass, along the axes of the world. Rows.
     pub inertia: [[f64; 3]; 3],
-    /// The share of lines that cross the surface an odd number of times, among those that cross it. Zero
-    /// for a closed scan; above a few hundredths the scan has holes, and the moments are doubtful.
-    pub open: f64,
+    /// The difference between the greatest and the least volume by lines along one axis, as a share of
+    /// the volume. A few hundredths for a closed scan; more if the scan has a large hole, through which
+    /// lines along one axis leave.
+    pub spread: f64,
 }
 
 /// Integrals over a solid of 1, of x, and of x·xᵀ.
@@ -42,8 +43,8 @@ impl Target<'_> {
     /// the world, and counts the parts of each line between the first and the second place where it
     /// crosses the surface, the third and the fourth, and so on.
     ///
-    /// A line that crosses an odd number of times, through a hole, counts as the one before it in its
-    /// row. Parts thinner than about 0.3 local radii count as one crossing. The error falls with `lines`;
+    /// A line that crosses an odd number of times, through a hole or along the surface, counts as the one
+    /// before it in its row. Parts thinner than about 0.3 local radii count as one crossing. The error falls with `lines`;
     /// 64 give a volume within one percent. The scan need not be oriented.
     ///
     /// `None` if no line crosses the surface twice, or the pose is invalid. Costs 3 · `lines`² calls of
@@ -53,9 +54,8 @@ impl Target<'_> {
         let bounds = self.scan().bounds()?;
         let low = Vector3::from(bounds.min);
         let extent = Vector3::from(bounds.max) - low;
-        let (mut sum, mut hits) = (Integrals::default(), Vec::new());
-        let [mut crossing, mut odd] = [0_u32; 2];
-        for axis in 0..3 {
+        let (mut sums, mut hits) = ([Integrals::default(); 3], Vec::new());
+        for (axis, sum) in sums.iter_mut().enumerate() {
             let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
             let cell = extent[u] * extent[v] / f64::from(lines).powi(2);
             for row in 0..lines {
@@ -68,17 +68,19 @@ impl Target<'_> {
                     from[axis] -= 0.01 * extent[axis];
                     let ray = Ray::new(from.into(), Vector3::ith_axis(axis).into_inner().into());
                     self.cast_all(&ray, &mut hits, scratch);
-                    crossing += u32::from(!hits.is_empty());
-                    if hits.len() % 2 == 1 {
-                        odd += 1;
-                    } else {
+                    if hits.len() % 2 == 0 {
                         last = along(&from, axis, &hits);
                     }
-                    sum.add(&last, cell / 3.0);
+                    sum.add(&last, cell);
                 }
             }
         }
-        let Integrals { volume, first, second } = sum;
+        let mut mean = Integrals::default();
+        sums.iter().for_each(|sum| mean.add(sum, 1.0 / 3.0));
+        let Integrals { volume, first, second } = mean;
+        let volumes = sums.map(|sum| sum.volume);
+        let most = volumes.into_iter().fold(0.0, f64::max);
+        let least = volumes.into_iter().fold(most, f64::min);
         let centre = first / volume;
         let about = second - centre * centre.transpose() * volume;
         let inertia = Matrix3::identity() * about.trace() - about;
@@ -87,7 +89,7 @@ impl Target<'_> {
             centre: centre.into(),
             // Symmetric: rows are columns.
             inertia: inertia.into(),
-            open: f64::from(odd) / f64::from(crossing.max(1)),
+            spread: (most - least) / volume,
         })
     }
 }

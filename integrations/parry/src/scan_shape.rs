@@ -78,20 +78,20 @@ impl ScanShape {
     }
 
     /// The same shape with the mass properties of the solid that the scan encloses
-    /// ([`Target::moments`] with 64 lines: some 50 ms). `None` if it encloses none, or has holes for
-    /// more than a twentieth of the lines.
+    /// ([`Target::moments`] with 64 lines: some 50 ms). `None` if it encloses none, or if
+    /// the volumes by lines along the three axes differ by more than a twentieth, because of a hole.
     #[must_use]
     pub fn solid(self) -> Option<Self> {
         /// Lines along each of two axes.
         const LINES: u16 = 64;
-        /// The greatest share of lines through holes.
-        const OPEN: f64 = 0.05;
+        /// The greatest difference between volumes by lines along one axis.
+        const SPREAD: f64 = 0.05;
         let moments = with_scratch(|scratch| self.target().moments(LINES, scratch))?;
         let [x, y, z] = moments.inertia.map(to_vector);
         let centre = to_vector(moments.centre);
         let inertia = Mat3::from_cols(x, y, z);
         let mass = MassProperties::with_inertia_matrix(centre, to_real(moments.volume), inertia);
-        (moments.open <= OPEN).then(|| self.with_mass(mass))
+        (moments.spread <= SPREAD).then(|| self.with_mass(mass))
     }
 
     /// The same shape with the mass properties of a solid of density one, in the frame of the shape.

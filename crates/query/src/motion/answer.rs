@@ -88,9 +88,8 @@ pub enum ShapeSweepVerdict {
         t_free: f64,
         /// The first time at which a contact was found.
         t_hit: f64,
-        /// The deepest contact at time `t_hit`. `None` if the shape touches nothing but the rim of a
-        /// disc, from beside.
-        contact: Option<ShapeContact>,
+        /// The deepest contact at time `t_hit`. Its depth is about zero, or about less the margin.
+        contact: ShapeContact,
     },
     /// The motion is proven free up to `t_free`. No contact was found after it, but no proof either.
     Undecided {

@@ -74,10 +74,31 @@ pub(crate) fn sweep(
             let moved = shape.moved(&motion.at(t_hit));
             let solid = moved.as_ref().and_then(|it| Solid::new(it, elements.placed.stored_to_world()));
             contacts(elements, solid.as_ref(), None, found, (level, scratch, candidates));
-            ShapeSweepVerdict::Impact { t_free, t_hit, contact: found.first().copied() }
+            match (found.first(), course.at(t_hit)) {
+                (Some(&contact), _) => ShapeSweepVerdict::Impact { t_free, t_hit, contact },
+                (None, Ok(nearest)) => {
+                    let contact = between(&nearest, solid.map(|it| elements.in_world(&it.inside)));
+                    ShapeSweepVerdict::Impact { t_free, t_hit, contact }
+                }
+                (None, Err(reason)) => ShapeSweepVerdict::Undecided { t_free, reason },
+            }
         }
     };
     ShapeSweep { verdict, distances: course.distances }
+}
+
+/// The contact at the nearest points of a shape that touches nothing but the rim of a disc from beside, as
+/// a shape without a radius does just before it crosses the disc. `inside` is in the shape.
+fn between(nearest: &ShapeDistance, inside: Option<[f64; 3]>) -> ShapeContact {
+    let [point, on_shape] = nearest.points.map(Vector::from);
+    let away = |to: Vector| (to - point).try_normalize(0.0);
+    let normal = away(on_shape).or_else(|| away(inside?.into())).unwrap_or_else(Vector::z);
+    ShapeContact {
+        point: point.into(),
+        normal: normal.into(),
+        depth: -(on_shape - point).norm(),
+        id: u64::from(nearest.source.0),
+    }
 }
 
 /// The outcome of an advancement.

@@ -35,7 +35,7 @@ fn spheres_and_tori_have_their_moments_in_any_pose() {
         near(ball.inertia[k][k], 0.4 * volume, 0.02, "the inertia of a ball");
         assert!(ball.inertia[k][(k + 1) % 3].abs() < 0.01 * volume, "{:?}", ball.inertia);
     }
-    assert!(ball.open < 0.01, "{} of the lines find holes", ball.open);
+    assert!(ball.spread < 0.01, "{} between the axes", ball.spread);
 
     let (major, minor) = (1.0_f64, 0.4_f64);
     let ring = moments(&sampled(torus(major, minor)), &Pose::IDENTITY, 64).expect("a solid");
@@ -50,10 +50,13 @@ fn open_scans_say_so() {
     let points = sampled(sphere(0.5));
     // Without a cap, lines along its axis leave through the hole.
     let bowl: Vec<[f64; 3]> = points.iter().filter(|p| p[2] < 0.3).copied().collect();
-    let open = moments(&bowl, &Pose::IDENTITY, 32).expect("lines cross it").open;
-    assert!(open > 0.1, "{open} of the lines find the hole");
+    let spread = moments(&bowl, &Pose::IDENTITY, 32).expect("lines cross it").spread;
+    assert!(spread > 0.2, "{spread} between the axes");
     let plate: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], 0.0]).collect();
-    assert!(moments(&plate, &Pose::IDENTITY, 32).is_none_or(|it| it.open > 0.5), "a plate encloses nothing");
+    assert!(
+        moments(&plate, &Pose::IDENTITY, 32).is_none_or(|it| it.spread > 0.5),
+        "a plate encloses nothing"
+    );
     let nowhere = Pose::from_translation([f64::NAN; 3]);
     assert_eq!(moments(&points, &nowhere, 32), None, "an invalid pose");
 }

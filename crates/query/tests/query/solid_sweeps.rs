@@ -8,7 +8,7 @@ use nearmiss_query::{
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::shapes::{self, Order, Sampling};
-use rand::RngExt;
+use rand::{Rng, RngExt};
 
 type Vector = Vector3<f64>;
 
@@ -24,6 +24,26 @@ fn shapes_of(size: f64) -> [Shape<'static>; 5] {
     ]
 }
 
+/// Poses near the torus. A path that stays on one side of it is often free.
+fn path(rng: &mut impl Rng, stays: bool) -> Vec<Pose> {
+    let side = unit_vector(rng);
+    let mut pose = || {
+        let place = if stays {
+            let (away, beside) = (rng.random_range(1.4..2.4), point_in(rng, 0.5));
+            [0, 1, 2].map(|k| side[k] * away + beside[k])
+        } else {
+            unit_vector(rng).map(|x| x * rng.random_range(0.6..2.4))
+        };
+        rotation(rng).with_translation(place)
+    };
+    vec![pose(), pose(), pose()]
+}
+
+/// The signed distance of a place from the torus.
+fn off_the_torus(p: Vector) -> f64 {
+    (p.xy().norm() - 1.0).hypot(p.z) - 0.4
+}
+
 #[test]
 fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
     let sampled = shapes::torus(1.0, 0.4).sample(Sampling {
@@ -37,20 +57,18 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
     let r = scan.sampling_radius();
     let rng = &mut rng(11);
     let mut scratch = Scratch::default();
-    let (mut seen, mut clear, mut proven, mut queries, mut late, mut told) = ([0; 3], 0, 0, 0, 0, 0);
-    for round in 0..120_usize {
+    let (mut seen, mut clear, mut proven, mut queries, mut late) = ([0; 3], 0, 0, 0, 0);
+    for round in 0..80_usize {
         let margin = [0.0, 0.1][round % 2];
         let plan = ShapePlan::new(&CollideOptions::default().with_margin(margin), &scan).unwrap();
         let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
         let shape = shapes_of(0.15)[round % 5];
-        let poses: Vec<Pose> = (0..3)
-            .map(|_| rotation(rng).with_translation(unit_vector(rng).map(|x| x * rng.random_range(0.6..2.4))))
-            .collect();
+        let poses = path(rng, round % 4 < 2);
         let motion = Motion::through(&poses).unwrap();
         let answer = target.sweep(&shape, &motion, &mut scratch);
         queries += answer.distances;
         // Brute force.
-        let steps = 1000_u32;
+        let steps = 400_u32;
         let at = |step: u32| f64::from(step) / f64::from(steps) * motion.duration();
         let mut upper = |time: f64| {
             let moved = shape.moved(&motion.at(time)).unwrap();
@@ -80,7 +98,13 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
                 // A hit between two of the times of brute force may be missed by it.
                 let error = first.map_or(0.0, |first| (t_hit - first) * way(t_hit));
                 assert!(error < r, "impact at {t_hit} instead of {first:?}");
-                told += usize::from(contact.is_some());
+                let depth = contact.depth + margin;
+                assert!(
+                    t_hit == 0.0 || depth.abs() < 0.5 * r,
+                    "{contact:?} at {t_hit}, margin {margin}, r {r}"
+                );
+                let off = off_the_torus(contact.point.into());
+                assert!(off.abs() < 0.5 * r, "{contact:?} is {off} off, r {r}");
                 late += usize::from((t_hit - t_free) * way(t_hit) > 2.0 * r);
                 seen[1] += 1;
             }
@@ -92,12 +116,11 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
             }
         }
     }
-    assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}");
+    assert!(seen[0] > 15 && seen[1] > 15, "free, impact, undecided: {seen:?}");
     assert!(proven * 100 >= clear * 95, "{proven} of {clear} motions that stay clear are proven");
-    assert!(told * 10 >= seen[1] * 9, "{told} contacts of {} impacts", seen[1]);
     // Only where a shape slides beside the scan first.
     assert!(late * 4 <= seen[1], "{late} of {} impacts long after the end of the proof", seen[1]);
-    assert!(queries < 120 * 40, "{queries} distance queries");
+    assert!(queries < 80 * 40, "{queries} distance queries");
 }
 
 #[test]
