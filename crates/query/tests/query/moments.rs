@@ -51,7 +51,7 @@ fn open_scans_say_so() {
     // Without a cap, lines along its axis leave through the hole.
     let bowl: Vec<[f64; 3]> = points.iter().filter(|p| p[2] < 0.3).copied().collect();
     let spread = moments(&bowl, &Pose::IDENTITY, 32).expect("lines cross it").spread;
-    assert!(spread > 0.2, "{spread} between the axes");
+    assert!(spread > 0.1, "{spread} between the axes");
     let plate: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], 0.0]).collect();
     assert!(
         moments(&plate, &Pose::IDENTITY, 32).is_none_or(|it| it.spread > 0.5),
