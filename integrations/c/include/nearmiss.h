@@ -282,7 +282,7 @@ typedef int32_t NearmissShapeKind;
 #endif // __cplusplus
 
 /*
- What the last question about a pair of scans found out. Keep one for each pair whose poses
+ The findings of the last question about a pair of scans. Keep one for each pair whose poses
  change little between questions. It never changes a verdict, except one that a budget ends.
  */
 typedef struct NearmissHint NearmissHint;
@@ -434,7 +434,7 @@ typedef struct NearmissOptions {
      */
     double margin;
     /*
-     How far a lower bound of a distance may stay below the upper one, as a share of it.
+     The share of the upper bound of a distance by which the lower one may stay below it.
      */
     double relative;
 } NearmissOptions;
