@@ -43,9 +43,9 @@ impl Target<'_> {
     /// the world, and counts the parts of each line between the first and the second place where it
     /// crosses the surface, the third and the fourth, and so on.
     ///
-    /// A line that crosses an odd number of times, through a hole or along the surface, counts as the one
-    /// before it in its row. Parts thinner than about 0.3 local radii count as one crossing. The error falls with `lines`;
-    /// 64 give a volume within one percent. The scan need not be oriented.
+    /// A line that crosses an odd number of times, through a hole or along the surface, counts as the
+    /// one before it in its row. Parts thinner than about 0.3 local radii count as one crossing. The
+    /// error falls with `lines`; 64 give a volume within one percent. The scan need not be oriented.
     ///
     /// `None` if no line crosses the surface twice, or the pose is invalid. Costs 3 · `lines`² calls of
     /// [`Self::cast_all`].
