@@ -133,10 +133,11 @@ pub struct PointColumn<'a> {
 ///     data.extend([0; 4]);
 /// }
 /// let field = |name, offset| PointField { name, offset, datatype: 7, count: 1 };
+/// let fields = [field("x", 0), field("y", 4), field("z", 8)];
 /// let view = PointCloud2View::new(PointCloud2 {
 ///     height: 2,
 ///     width: 2,
-///     fields: &[field("x", 0), field("y", 4), field("z", 8)],
+///     fields: &fields,
 ///     is_bigendian: false,
 ///     point_step: 16,
 ///     row_step: 32,
