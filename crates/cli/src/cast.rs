@@ -11,18 +11,21 @@ use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::answer_report::word;
-use crate::console::{Console, Results, now};
-use crate::digits::{place, rounded};
+use crate::console::{Console, Results, now, warn};
+use crate::digits::{percent, place, rounded};
 use crate::error::CliError;
-use crate::input::{Opening, TextLines};
+use crate::input::Opening;
+use crate::json_lines::JsonLines;
+use crate::parse::parse_radius;
 use crate::posing;
 use crate::preprocess::parse_threads;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
-use depth_picture::Viewer;
+use depth_picture::{Painted, Viewer};
 
 /// Options of `cast`.
 #[derive(Debug, Clone, Args)]
+#[command(group = clap::ArgGroup::new("asked").required(true).multiple(true).args(["rays", "image"]))]
 pub struct CastArgs {
     /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     pub scan: PathBuf,
@@ -30,7 +33,7 @@ pub struct CastArgs {
     ///
     /// `{"origin":[x,y,z],"direction":[x,y,z]}`, with `"max":d` for a ray that ends after the length d,
     /// and `"radius":r` for a ball that moves along the ray. Each ray gets one line of output, in order.
-    #[arg(long, value_name = "FILE.jsonl", required_unless_present = "image")]
+    #[arg(long, value_name = "FILE.jsonl")]
     pub rays: Option<PathBuf>,
     /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
@@ -42,6 +45,8 @@ pub struct CastArgs {
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
     /// Draw a depth image as PNG: one ray for each pixel, coloured by its length
+    ///
+    /// The camera is at --from and looks at --to.
     #[arg(long, value_name = "OUT.png", requires_all = ["from", "to"], help_heading = "Depth image")]
     pub image: Option<PathBuf>,
     /// Place of the camera
@@ -76,6 +81,16 @@ pub struct CastArgs {
         help_heading = "Depth image"
     )]
     pub up: Option<Up>,
+    /// Radius of balls that move along the rays of the image; 0 for rays
+    #[arg(
+        long,
+        value_name = "R",
+        value_parser = parse_radius,
+        allow_hyphen_values = true,
+        requires = "image",
+        help_heading = "Depth image"
+    )]
+    pub radius: Option<f64>,
     /// Print one JSON object for each ray
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -91,6 +106,8 @@ struct CastReport {
     t: Option<f64>,
     point: Option<[f64; 3]>,
     normal: Option<[f64; 3]>,
+    /// The index of the measured point.
+    source: Option<u32>,
     evidence: &'static str,
     micros: f64,
 }
@@ -130,7 +147,7 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     }
     if let Some(path) = &args.image {
         let plan = ShapePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan)?;
-        draw(args, &Target::new(scan.at(&pose), &plan), (path, console))?;
+        draw(args, &Target::new(scan.at(&pose), &plan), (path, console), &mut results)?;
     }
     results.flush()
 }
@@ -156,6 +173,7 @@ fn answer(
                 t: hit.map(|hit| hit.t),
                 point: hit.map(|hit| hit.point),
                 normal: hit.map(|hit| hit.normal),
+                source: hit.map(|hit| hit.source.0),
                 evidence: word(evidence),
                 micros,
             })?;
@@ -167,7 +185,12 @@ fn answer(
 }
 
 /// Draws the depth image.
-fn draw(args: &CastArgs, target: &Target<'_>, (path, console): (&Path, Console)) -> Result<(), CliError> {
+fn draw(
+    args: &CastArgs,
+    target: &Target<'_>,
+    (path, console): (&Path, Console),
+    results: &mut Results,
+) -> Result<(), CliError> {
     let (Some(eye), Some(place)) = (args.from, args.to) else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
     let viewer = Viewer::new(&view, target, [eye, place], args.angle).ok_or_else(|| {
@@ -177,9 +200,16 @@ fn draw(args: &CastArgs, target: &Target<'_>, (path, console): (&Path, Console))
     })?;
     let bar = console.spinner(format_args!("painting {}", path.display()));
     let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let picture = depth_picture::paint(target, &viewer, &name);
+    let Painted { picture, share } = depth_picture::paint(target, &viewer, args.radius.unwrap_or(0.0), &name);
     drop(bar);
-    output::save_picture(&picture, path)
+    output::save_picture(&picture, path)?;
+    if share == 0.0 {
+        warn("no ray of the image hits the scan; `nearmiss inspect` tells its bounds for --from and --to");
+    }
+    if args.json || args.quiet {
+        return Ok(());
+    }
+    results.line(format_args!("{} of the rays hit; drawn in {}", percent(share), path.display()))
 }
 
 /// Returns the answer as a sentence. Places are rounded to `unit`.
@@ -214,33 +244,22 @@ struct RayLine {
 
 /// A file with a ray on each line.
 struct RayFile {
-    lines: TextLines,
-    /// `true` until a line with a ray has been read.
-    is_empty: bool,
+    lines: JsonLines,
 }
 
 impl RayFile {
     fn open(path: &Path) -> Result<Self, CliError> {
-        Ok(Self { lines: TextLines::open(path)?, is_empty: true })
+        Ok(Self { lines: JsonLines::open(path, "rays", RAY_LINE)? })
     }
 
-    /// Returns the number of the next line that is not blank, counted from 1, and its text.
+    /// Returns the number of the next line with a ray, counted from 1, and its text.
     fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
-        let line = self.lines.next_filled()?;
-        if line.is_none() && self.is_empty {
-            return Err(self.lines.unsuitable(format!("expected rays, got none; {RAY_LINE}")));
-        }
-        self.is_empty = false;
-        Ok(line)
+        self.lines.next_line()
     }
 
     /// Parses the ray on line `number`, whose text is `text`.
     fn ray(&self, number: u64, text: &str) -> Result<Ray, CliError> {
-        let line: RayLine = serde_json::from_str(text).map_err(|e| {
-            let message = e.to_string();
-            let what = message.split(" at line ").next().unwrap_or_default();
-            self.lines.fault_on(number, format!("column {}: {what}; {RAY_LINE}", e.column()))
-        })?;
+        let line: RayLine = self.lines.parse(number, text)?;
         let RayLine { origin, direction, max, radius, .. } = line;
         let fault = |what: &str| Err(self.lines.fault_on(number, what));
         if direction == [0.0; 3] {

@@ -10,7 +10,7 @@ use crate::contacts::ContactArgs;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
-use crate::parse::{parse_duration, parse_radius, parse_threads};
+use crate::parse::{parse_duration, parse_radius, parse_threads, parse_work};
 use crate::path::PathArgs;
 use crate::posing::PairArgs;
 use crate::search::{MethodName, OrderName, SearchArgs};
@@ -64,7 +64,7 @@ pub struct CollideArgs {
     /// Work limit for each query; reproducible, unlike time
     ///
     /// A unit is one evaluation of f or one node pair; 500 to 10000 is common.
-    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    #[arg(long, value_name = "N", value_parser = parse_work, help_heading = "Budget and evidence")]
     pub work: Option<u64>,
     /// Level of detail of a contact
     #[arg(long, value_enum, default_value_t = DetailName::Witness)]

@@ -15,7 +15,7 @@ use crate::digits::{count, rough, short, work};
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::no_curve::NoCurve;
-use crate::parse::parse_duration;
+use crate::parse::{parse_duration, parse_work};
 use crate::picture::names;
 use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
@@ -45,7 +45,7 @@ pub struct CurveArgs {
     #[arg(long, value_name = "5ms", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
     pub budget: Option<Duration>,
     /// Work limit, in evaluations of f and node pairs; reproducible, unlike time
-    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    #[arg(long, value_name = "N", value_parser = parse_work, help_heading = "Budget and evidence")]
     pub work: Option<u64>,
     /// Threads to prepare raw inputs; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]

@@ -17,7 +17,7 @@ use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
 use crate::mesh::distance::DistanceQuestion;
-use crate::parse::parse_duration;
+use crate::parse::{parse_duration, parse_work};
 use crate::path::{PathArgs, PathLog};
 use crate::path_entry::{PathEntry, PathVerdict};
 use crate::picture::names;
@@ -66,7 +66,7 @@ pub struct DistanceArgs {
     /// Work limit for each query; reproducible, unlike time
     ///
     /// A unit is one evaluation of f or one node pair; 1000 to 20000 is common.
-    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    #[arg(long, value_name = "N", value_parser = parse_work, help_heading = "Budget and evidence")]
     pub work: Option<u64>,
     /// Threads to prepare raw inputs; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]

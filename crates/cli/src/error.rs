@@ -225,9 +225,9 @@ fn of_other_kind(cause: &LoadError) -> Option<&'static str> {
     };
     match (*found, *expected) {
         (Mesh::KIND, Scan::KIND) => Some(
-            "expected a prepared scan, got a prepared mesh; compare two meshes with `mesh-collide` or `distance --as-mesh \
-             both`, a mesh and a scan with `collide` or `distance` and --as-mesh a or b, or make it a scan: put points \
-             on its faces with `sample`, or prepare its vertices with `preprocess` without --as-mesh",
+            "expected a prepared scan, got a prepared mesh; compare its triangles with `mesh-collide`, or with `collide`, \
+             `distance` or `sweep` and --as-mesh, or make it a scan: put points on its faces with `sample`, or prepare \
+             its vertices with `preprocess` without --as-mesh",
         ),
         (Scan::KIND, Mesh::KIND) => Some(
             "expected a prepared mesh, got a prepared scan; compare two scans with `collide` or `distance` without \

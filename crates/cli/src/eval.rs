@@ -152,7 +152,7 @@ const STARTS_OF_SCANS: [&str; 2] = ["ply", "VERSION"];
 /// Returns the next point. Blank lines are skipped, and comments, which start with `#` or `//`.
 fn next_point(lines: &mut TextLines) -> Result<Option<[f64; 3]>, CliError> {
     while let Some((_, text)) = lines.next_filled()? {
-        if text.starts_with('#') || text.starts_with("//") {
+        if text.starts_with("//") {
             continue;
         }
         if STARTS_OF_SCANS.iter().any(|start| text.starts_with(start)) {

@@ -351,7 +351,8 @@ impl TextLines {
         self.length
     }
 
-    /// Returns the number of the next line that is not blank, counted from 1, and its text.
+    /// Returns the number of the next line that is neither blank nor a comment, counted from 1, and its
+    /// text. Comments start with `#`.
     pub(crate) fn next_filled(&mut self) -> Result<Option<(u64, String)>, CliError> {
         loop {
             let mut bytes = Vec::new();
@@ -374,7 +375,7 @@ impl TextLines {
                     self.fault("expected UTF-8 text, got other bytes; check that this is a text file")
                 })?
                 .trim();
-            if !text.is_empty() {
+            if !text.is_empty() && !text.starts_with('#') {
                 return Ok(Some((self.number, text.to_owned())));
             }
         }

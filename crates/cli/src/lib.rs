@@ -30,6 +30,7 @@ mod estimate;
 mod filters;
 mod guarded;
 mod input;
+mod json_lines;
 mod matrix;
 mod memory;
 mod output;

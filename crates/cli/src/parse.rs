@@ -14,6 +14,11 @@ pub(crate) fn parse_length(text: &str) -> Result<f64, String> {
     length.ok_or_else(|| "expected a length of more than zero, in the units of the input".into())
 }
 
+/// Parses a limit of the work.
+pub(crate) fn parse_work(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_not_a_count| "expected a whole number of zero or more, such as 2000".into())
+}
+
 /// Parses a time with its unit.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let unit =

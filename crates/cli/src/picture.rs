@@ -43,7 +43,7 @@ pub(crate) const LARGEST: f64 = 14.0;
 
 /// If the extent of a scan is less than this share of the other's, its hidden parts are shown with
 /// this opacity.
-const SMALL: f64 = 0.5;
+pub(crate) const SMALL: f64 = 0.5;
 const OPACITY: f64 = 0.6;
 
 /// Rejects a file name whose extension is not that of a PNG.
@@ -181,7 +181,7 @@ pub(crate) fn paint_sized(
 }
 
 /// Returns half the diagonal of a scan's bounding box, in the world.
-fn half_diagonal(view: &Placed<'_>) -> f64 {
+pub(crate) fn half_diagonal(view: &Placed<'_>) -> f64 {
     let half = Vector3::from(view.scan().bounds().half_extents());
     half.norm() * view.stored_to_world().scale() / view.scan().frame().scale
 }

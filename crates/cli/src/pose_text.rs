@@ -4,6 +4,7 @@ use nearmiss::Pose;
 use serde::Deserialize;
 
 use crate::input::pieces;
+use crate::json_lines::json_fault;
 use crate::matrix::Matrix;
 
 /// Quaternions whose norm differs more than this from 1 are not in the order x y z w, or not quaternions.
@@ -52,8 +53,12 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 }
 
 fn number(piece: &str) -> Result<f64, String> {
-    let shown = || piece.chars().take(40).flat_map(char::escape_debug).collect::<String>();
-    piece.parse().map_err(|_not_a_number| format!("expected a number, got `{}`", shown()))
+    piece.parse().map_err(|_not_a_number| format!("expected a number, got `{}`", excerpt(piece)))
+}
+
+/// Returns the beginning of a text, for messages.
+fn excerpt(text: &str) -> String {
+    text.chars().take(40).flat_map(char::escape_debug).collect()
 }
 
 /// The poses of a query as given on one line of a file.
@@ -109,8 +114,11 @@ impl PoseFormat {
 
     /// Parses a line of this format.
     pub(crate) fn read(&self, line: &str) -> Result<PoseRow, String> {
+        let is_json = line.starts_with(['{', '[']);
         match self {
-            Self::Json => json(line),
+            Self::Json if is_json => json(line),
+            Self::Json => Err(format!("expected JSON as on the first line, got `{}`", excerpt(line))),
+            _ if is_json => Err("expected numbers as on the first line, got JSON".to_owned()),
             Self::Numbers(count) => {
                 let numbers = numbers(line)?;
                 if numbers.len() != *count {
@@ -132,13 +140,13 @@ impl PoseFormat {
 /// The numbers of a pose in JSON, flat or in rows.
 #[derive(Debug, Deserialize)]
 #[serde(untagged, expecting = "expected the numbers of a pose: [16, 12 or 7 numbers], or 4 or 3 rows of 4")]
-enum JsonPose {
+pub(crate) enum JsonPose {
     Flat(Vec<f64>),
     Rows(Vec<[f64; 4]>),
 }
 
 impl JsonPose {
-    fn matrix(&self) -> Result<Matrix, String> {
+    pub(crate) fn matrix(&self) -> Result<Matrix, String> {
         match self {
             Self::Flat(numbers) => from_numbers(numbers),
             Self::Rows(rows) => from_numbers(rows.as_flattened()),
@@ -157,12 +165,7 @@ struct JsonRow {
 }
 
 fn json(line: &str) -> Result<PoseRow, String> {
-    let faulty = |cause: serde_json::Error| {
-        let message = cause.to_string();
-        let what = message.split(" at line ").next().unwrap_or_default();
-        let place = if cause.column() > 0 { format!("column {}: ", cause.column()) } else { String::new() };
-        format!("{place}{what}; {FILE_FORMS}")
-    };
+    let faulty = |cause: serde_json::Error| format!("{}; {FILE_FORMS}", json_fault(&cause));
     if line.starts_with('[') {
         let pose: JsonPose = serde_json::from_str(line).map_err(faulty)?;
         return Ok(PoseRow::of_b(pose.matrix()?, None));

@@ -143,7 +143,11 @@ pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, C
     if pieces(given).nth(1).is_some() {
         return Err(CliError::Usage(format!("{option}: {what}")));
     }
-    Err(CliError::Usage(format!("{option}: expected {FORMS}, or a file that holds them, got `{given}`")))
+    let got = match given.parse::<f64>() {
+        Ok(_) => "got 1 number".to_owned(),
+        Err(_) => format!("found no file `{given}`"),
+    };
+    Err(CliError::Usage(format!("{option}: expected {FORMS}, or a file that holds them; {got}")))
 }
 
 /// Returns the pose nearest to `matrix`. Fails if it moves the object's bounds by more than its
@@ -236,8 +240,7 @@ impl PoseFile {
         self.progress.answered.add(1);
     }
 
-    /// Returns the next line with poses, and its number, counted from 1. Lines that start with `#` are
-    /// comments.
+    /// Returns the next line with poses, and its number, counted from 1.
     pub(crate) fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
         loop {
             let Some((number, text)) = self.lines.next_filled()? else {
@@ -246,9 +249,6 @@ impl PoseFile {
                 }
                 return Ok(None);
             };
-            if text.starts_with('#') {
-                continue;
-            }
             if self.format.is_none() {
                 let format = PoseFormat::of(&text).map_err(|what| self.lines.fault_on(number, what))?;
                 let has_header = format.has_header();

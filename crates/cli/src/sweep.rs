@@ -18,7 +18,7 @@ use crate::console::{Console, Results, now};
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
-use crate::parse::{parse_duration, parse_radius};
+use crate::parse::{parse_duration, parse_radius, parse_work};
 use crate::posing::{PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
 use crate::viewpoint::ViewArgs;
@@ -37,10 +37,10 @@ pub struct SweepArgs {
     /// be left out, or the pose of b alone. From line to line each scan moves by a screw: a steady
     /// rotation about an axis and a steady shift along it. It turns the shorter way, by at most
     /// half a turn; give more lines for more. The scale must stay the same.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, alias = "poses", value_name = "FILE")]
     pub path: PathBuf,
     /// Distance that the scans must keep, in world units
-    #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
+    #[arg(long, alias = "margin", value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub clearance: f64,
     /// Distances that define the surfaces; by default those that the scans were prepared for
     ///
@@ -50,7 +50,7 @@ pub struct SweepArgs {
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Compare the triangles of this input instead of its points
+    /// Compare the triangles of this input, a or b, instead of its points
     #[arg(long, value_enum, value_name = "WHICH")]
     pub as_mesh: Option<AsMeshName>,
     /// Time limit for the whole motion, such as 50ms
@@ -61,7 +61,7 @@ pub struct SweepArgs {
     /// Work limit for the whole motion; reproducible, unlike time
     ///
     /// A unit is one evaluation of f or one node pair.
-    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    #[arg(long, value_name = "N", value_parser = parse_work, help_heading = "Budget and evidence")]
     pub work: Option<u64>,
     /// Threads to prepare raw inputs; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]

@@ -103,12 +103,13 @@ impl Canvas {
         Self { width, height, pixels: vec![ground; count], depth: vec![f64::NEG_INFINITY; count] }
     }
 
-    /// Fills the part of `area` that is on the canvas.
+    /// Fills the part of `area` that is on the canvas, over everything there.
     pub fn fill(&mut self, area: Area, colour: Colour) {
         for y in area.top..(area.top + area.height).min(self.height) {
             let row = y * self.width;
             let [left, right] = [area.left, area.left + area.width].map(|x| row + x.min(self.width));
             self.pixels[left..right].fill(colour);
+            self.depth[left..right].fill(f64::NEG_INFINITY);
         }
     }
 

@@ -84,6 +84,7 @@ impl Pose {
     };
 
     /// Creates a translation by `t`.
+    #[inline]
     #[must_use]
     pub fn from_translation(t: [f64; 3]) -> Self {
         Self { translation: t.into(), ..Self::IDENTITY }
@@ -102,6 +103,7 @@ impl Pose {
 
     /// Creates the rotation of a quaternion (x, y, z, w) of any length. Returns the identity for
     /// length zero.
+    #[inline]
     #[must_use]
     pub fn from_quaternion(q: [f64; 4]) -> Self {
         let q = nalgebra::Quaternion::from(q);
@@ -121,6 +123,7 @@ impl Pose {
     /// let moved = pose.apply([1.0, 0.0, 0.0]);
     /// assert!((0..3).all(|k| (moved[k] - [1.0, 3.0, 3.0][k]).abs() < 1e-12));
     /// ```
+    #[inline]
     #[must_use]
     pub fn new(translation: [f64; 3], quaternion: [f64; 4]) -> Self {
         Self::from_quaternion(quaternion).with_translation(translation)

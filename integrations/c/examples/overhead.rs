@@ -61,7 +61,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let c_scratch = c_scratch.ok_or("expected a scratch")?;
 
     for distance in [30.0, 0.3] {
-        let pose = Pose::from_translation([distance, 0.0, 0.0]);
         let a = Placed { scan: c_scan, pose: nearmiss_pose_identity() };
         let mut b = a;
         b.pose.translation[0] = distance;
@@ -69,7 +68,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut times = [Vec::new(), Vec::new()];
         for _ in 0..ROUNDS {
             times[0].push(time(|| {
-                let pair = Pair::new(scan.at(&Pose::IDENTITY), scan.at(std::hint::black_box(&pose)));
+                // The same numbers as from C: a position and a quaternion of either scan.
+                let [a, b] = std::hint::black_box([&a.pose, &b.pose]);
+                let [a, b] = [a, b].map(|pose| Pose::new(pose.translation, pose.rotation).with_scale(pose.scale));
+                let pair = Pair::new(scan.at(&a), scan.at(&b));
                 std::hint::black_box(pair.collide(&plan, &mut scratch));
             }));
             times[1].push(time(|| {

@@ -15,7 +15,7 @@ use crate::scratch::Scratch;
 use crate::status::{Failure, Status, guard};
 
 /// Returns the pair of two placed scans.
-#[inline]
+#[inline(always)]
 fn pair<'a>(
     a: Option<&Placed<'a>>,
     b: Option<&Placed<'a>>,

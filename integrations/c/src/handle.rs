@@ -69,7 +69,7 @@ fn wrong<H: Opaque>(mark: u64) -> Failure {
 }
 
 /// Returns the value of a handle.
-#[inline]
+#[inline(always)]
 pub(crate) fn get<'a, H: Opaque>(handle: Option<&'a H>, name: &str) -> Result<&'a H::Value, Failure> {
     let handle = handle.ok_or_else(|| Failure::null(name))?.handle();
     let mark = handle.mark.load(Ordering::Relaxed);
@@ -80,7 +80,7 @@ pub(crate) fn get<'a, H: Opaque>(handle: Option<&'a H>, name: &str) -> Result<&'
 }
 
 /// Returns the value of a handle, to change it.
-#[inline]
+#[inline(always)]
 pub(crate) fn get_mut<'a, H: Opaque>(
     handle: Option<&'a mut H>,
     name: &str,

@@ -31,7 +31,7 @@ pub struct Placed<'a> {
 
 impl Pose {
     /// Checks the numbers and returns the pose.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn checked(&self) -> Result<nearmiss::Pose, Failure> {
         let Self { translation: [x, y, z], rotation: [i, j, k, w], scale } = *self;
         // A sum is NaN or infinite if one of the numbers is.
@@ -56,7 +56,7 @@ impl Pose {
 
 impl<'a> Placed<'a> {
     /// Returns the placed scan.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn at(&self) -> Result<nearmiss::Placed<'a>, Failure> {
         Ok(get(self.scan, "scan")?.at(&self.pose.checked()?))
     }

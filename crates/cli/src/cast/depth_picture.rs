@@ -68,11 +68,18 @@ impl Viewer {
     }
 }
 
-/// Casts a ray for each pixel, on all threads, and paints the image.
-pub(super) fn paint(target: &Target<'_>, viewer: &Viewer, name: &str) -> Picture {
+/// A depth image.
+pub(super) struct Painted {
+    pub(super) picture: Picture,
+    /// The share of the rays that hit, from 0 to 1.
+    pub(super) share: f64,
+}
+
+/// Casts a ray for each pixel, or moves a ball of `radius` along it, on all threads, and paints the image.
+pub(super) fn paint(target: &Target<'_>, viewer: &Viewer, radius: f64, name: &str) -> Painted {
     let mut hits: Vec<Option<RayHit>> = vec![None; COLUMNS * ROWS];
     let _all = each(&mut hits, None, &mut BatchScratch::default(), |pixel, scratch| {
-        ControlFlow::Continue(target.cast(&viewer.ray(pixel), scratch).hit)
+        ControlFlow::Continue(target.cast(&viewer.ray(pixel).with_radius(radius), scratch).hit)
     });
     let [near, far] = range(&hits);
     let mut canvas = Canvas::new(COLUMNS * FINE + 2 * GAP, ROWS * FINE + 2 * GAP + LEGEND, GROUND);
@@ -96,7 +103,7 @@ pub(super) fn paint(target: &Target<'_>, viewer: &Viewer, name: &str) -> Picture
     let share = count as f64 / hits.len() as f64;
     let told = format!("{name}: {} of the rays hit. Darker where they graze the surface.", percent(share));
     legend::sentence(&mut canvas, [left, top + legend::LINE], width, &told);
-    canvas.picture()
+    Painted { picture: canvas.picture(), share }
 }
 
 /// The lengths of the rays that have the first and the last colour.

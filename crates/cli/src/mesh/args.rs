@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::contacts::ContactArgs;
-use crate::parse::{parse_duration, parse_threads};
+use crate::parse::{parse_duration, parse_threads, parse_work};
 use crate::path::PathArgs;
 use crate::posing::PairArgs;
 use crate::viewpoint::ViewArgs;
@@ -45,7 +45,7 @@ pub struct MeshCollideArgs {
     /// Work limit for each query; reproducible, unlike time
     ///
     /// A unit is one node pair; 500 to 10000 is common.
-    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
+    #[arg(long, value_name = "N", value_parser = parse_work, help_heading = "Budget and evidence")]
     pub work: Option<u64>,
     /// Probability from which on a pair of nodes counts as colliding
     ///
@@ -54,7 +54,7 @@ pub struct MeshCollideArgs {
     #[arg(long, value_name = "P", value_parser = parse_probability, conflicts_with = "all", help_heading = "Budget and evidence")]
     pub p_min: Option<f64>,
     /// Number of such pairs at which the search stops [default: 3]
-    #[arg(long, value_name = "K", requires = "p_min", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Budget and evidence")]
+    #[arg(long, value_name = "K", requires = "p_min", value_parser = parse_pairs, help_heading = "Budget and evidence")]
     pub k_min: Option<u32>,
     /// Threads; 0 for all cores
     ///
@@ -80,4 +80,9 @@ pub struct MeshCollideArgs {
 fn parse_probability(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|p| (0.0..=1.0).contains(p));
     number.ok_or_else(|| format!("expected a probability from 0 to 1, got `{text}`"))
+}
+
+/// Parses a number of pairs.
+fn parse_pairs(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|&pairs| pairs > 0).ok_or_else(|| "expected a whole number of 1 or more".into())
 }

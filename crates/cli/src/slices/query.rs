@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use nearmiss::slices::{Floor, ObjectError, Occupancy, SliceFolder, SliceMap, StoreError, Unloaded};
 use nearmiss::{Aabb, Pose};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::report::open;
 use crate::console::{self, Results, now};
 use crate::digits::{count, short};
 use crate::error::CliError;
-use crate::input::TextLines;
+use crate::json_lines::JsonLines;
+use crate::matrix::Matrix;
+use crate::pose_text::JsonPose;
 
 /// Tolerance of a rotation in a pose, in pixels of the object.
 const OFF: f64 = 0.1;
@@ -61,8 +64,8 @@ struct BoxLine {
 /// A line of a file of poses. Other fields are ignored.
 #[derive(Debug, Deserialize)]
 struct PoseLine {
-    a: Option<[f64; 16]>,
-    b: [f64; 16],
+    a: Option<JsonPose>,
+    b: JsonPose,
 }
 
 /// An answer.
@@ -95,7 +98,7 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         Err(other) => Err(CliError::Usage(other.to_string())),
     };
     if let Some(path) = &args.boxes {
-        each_line(path, BOX_LINE, |line: BoxLine| {
+        each_line(path, ["boxes", BOX_LINE], |line: BoxLine| {
             let bounds = Aabb { min: line.min, max: line.max };
             if !(0..3).all(|k| bounds.min[k] <= bounds.max[k]) {
                 return Err(format!(
@@ -114,7 +117,7 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         faults.extend(more);
         // Every query needs the whole object.
         folders.insert(0, folder);
-        each_line(path, POSE_LINE, |line: PoseLine| {
+        each_line(path, ["poses", POSE_LINE], |line: PoseLine| {
             let pose = pose(&line, &map, &object)?;
             let start = now();
             let found = map.meets(&object, &pose, floor);
@@ -141,38 +144,32 @@ fn why(folders: &[SliceFolder], Unloaded { slice }: Unloaded) -> Option<StoreErr
 }
 
 const BOX_LINE: &str = r#"a box is {"min":[x,y,z],"max":[x,y,z]}"#;
-const POSE_LINE: &str = r#"a pose line is {"a":[16 numbers],"b":[16 numbers]}"#;
+const POSE_LINE: &str = r#"a pose line is {"a":[16 numbers],"b":[16 numbers]}, where `a` may be left out"#;
 
 /// Reads and answers each line; errors name the number of the line.
-fn each_line<L: for<'a> Deserialize<'a>>(
+fn each_line<L: DeserializeOwned>(
     path: &Path,
-    form: &str,
+    [wanted, form]: [&'static str; 2],
     mut answer: impl FnMut(L) -> Result<Result<(), CliError>, String>,
 ) -> Result<(), CliError> {
-    let mut lines = TextLines::open(path)?;
-    let mut is_empty = true;
-    while let Some((_, text)) = lines.next_filled()? {
-        is_empty = false;
-        let line = serde_json::from_str(&text).map_err(|e| {
-            let message = e.to_string();
-            let what = message.split(" at line ").next().unwrap_or_default();
-            lines.fault(format!("column {}: {what}; {form}", e.column()))
-        })?;
-        answer(line).map_err(|what| lines.fault(what))??;
+    let mut lines = JsonLines::open(path, wanted, form)?;
+    while let Some((number, text)) = lines.next_line()? {
+        answer(lines.parse(number, &text)?).map_err(|what| lines.fault_on(number, what))??;
     }
-    if is_empty { Err(lines.unsuitable(format!("expected lines, got none; {form}"))) } else { Ok(()) }
+    Ok(())
 }
 
 /// Returns the object's pose in the building.
 fn pose(line: &PoseLine, map: &SliceMap, object: &SliceMap) -> Result<Pose, String> {
-    let read = |matrix: &[f64; 16], map: &SliceMap| {
+    let read = |given: &JsonPose, map: &SliceMap| {
+        let matrix: Matrix = given.matrix()?;
         let grid = map.grid();
         let far = [0, 1, 2].map(|k| {
             let size = if k == 2 { grid.slice_height } else { grid.pixel };
             grid.origin[k] + f64::from(grid.counts[k]) * size
         });
         let bounds = Aabb::of([grid.origin, far].map(|corner| grid.up.from_map(corner)));
-        Pose::from_row_major(matrix, &bounds, OFF * grid.pixel).map_err(|e| e.to_string())
+        Pose::from_row_major(&matrix, &bounds, OFF * grid.pixel).map_err(|e| e.to_string())
     };
     let b = read(&line.b, object)?;
     match &line.a {

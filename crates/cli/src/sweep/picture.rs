@@ -7,18 +7,25 @@ use nearmiss::{
 };
 use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, blend};
 use nearmiss_draw::legend;
-use nearmiss_draw::marks::{label, mark, title};
+use nearmiss_draw::marks::{frame, label, mark, title};
 use nearmiss_draw::picture::Picture;
 
 use super::report::time;
 use crate::digits::short;
 use crate::path_plot::ticks;
 use crate::picture::{
-    GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, Style, dot, scale_bar_in, splat,
+    GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, SMALL, Style, dot, half_diagonal, paint_sized,
+    sample as sample_of, scale_bar_in, splat,
 };
 
 /// The number of intervals at whose ends the clearance is measured.
 const SAMPLES: u32 = 160;
+
+/// The side of the picture of the whole of a, if the view shows the motion alone.
+const INSET: usize = PANEL / 4;
+
+/// Half the width of the view of a motion that is small beside a, in radii of the motion.
+const AROUND: f64 = 1.2;
 
 /// The number of intervals at whose ends b is shown.
 const SHOWN: usize = 6;
@@ -169,13 +176,33 @@ fn view(
     let shown: Vec<&Sample> = evenly.chain([nearest]).collect();
     let corners = |sample: &&Sample| scan.bounds().corners().map(|corner| sample.pose.apply(corner).into());
     let places: Vec<Vector3<f64>> = shown.iter().flat_map(corners).collect();
-    let hides = |points: &[Vector3<f64>], toward: &Vector3<f64>| hidden(points, &shown, *toward);
-    let camera = style.view.camera([a, &at_key], area, &places, hides);
-    paint_scan(canvas, &camera, a, OF_A, style);
-    for sample in &shown {
-        let placed = Placed::new(scan, &sample.pose);
-        paint_scan(canvas, &camera, &placed, colour(sample.upper / highest), style);
-    }
+    let way = Way::new(&places);
+    let sizes = [half_diagonal(a), way.radius];
+    let is_small = way.radius < SMALL * sizes[0];
+    let camera = if is_small {
+        let points = sample_of([a, &at_key]);
+        let hides = |toward: &Vector3<f64>| {
+            let front = way.front(toward);
+            let kept: Vec<_> = points.iter().filter(|p| toward.dot(p) <= front).copied().collect();
+            hidden(&kept, &shown, *toward)
+        };
+        style.view.close_camera([a, &at_key], area, (way.centre, AROUND * way.radius), hides)
+    } else {
+        let hides = |points: &[Vector3<f64>], toward: &Vector3<f64>| hidden(points, &shown, *toward);
+        style.view.camera([a, &at_key], area, &places, hides)
+    };
+    let toward = camera.axes[2];
+    let front = if is_small { way.front(&toward) } else { f64::INFINITY };
+    paint_sized(canvas, area, sizes, |canvas, side| {
+        if side == 0 {
+            paint_scan(canvas, &camera, a, (OF_A, |p| toward.dot(&p) <= front), style);
+            return;
+        }
+        for sample in &shown {
+            let placed = Placed::new(scan, &sample.pose);
+            paint_scan(canvas, &camera, &placed, (colour(sample.upper / highest), |_| true), style);
+        }
+    });
     let place = |sample: &Sample| {
         let [x, y, _] = camera.project(sample.centre);
         [x, y]
@@ -191,12 +218,66 @@ fn view(
     } else if answer.verdict.is_free() {
         mark(canvas, &camera, nearest.centre, 1.0);
     }
-    title(canvas, area, "The motion of b as seen from a");
     scale_bar_in(canvas, &camera, style.unit);
+    if is_small {
+        title(canvas, area, "The motion of b as seen from a; what is in front of it is cut away");
+        inset(canvas, area, (a, &at_key), &way, style);
+    } else {
+        title(canvas, area, "The motion of b as seen from a");
+    }
 }
 
-fn paint_scan(canvas: &mut Canvas, camera: &Camera, view: &Placed<'_>, colour: Colour, style: &Style) {
-    for i in 0..view.scan().len() {
+/// Paints the whole of a in a corner of the view, and frames the motion.
+fn inset(canvas: &mut Canvas, area: Area, (a, b): (&Placed<'_>, &Placed<'_>), way: &Way, style: &Style) {
+    let area = Area {
+        left: area.left + area.width - INSET - GAP,
+        top: area.top + area.height - INSET - GAP,
+        width: INSET,
+        height: INSET,
+    };
+    let border = Area { left: area.left - FINE, top: area.top - FINE, width: INSET + 2 * FINE, height: INSET + 2 * FINE };
+    canvas.fill(border, INK);
+    canvas.fill(area, PANEL_GROUND);
+    let camera = style.view.camera([a, b], area, &[], |_, _| 0.0);
+    paint_scan(canvas, &camera, a, (OF_A, |_| true), style);
+    if !frame(canvas, &camera, way.centre, AROUND * way.radius) {
+        mark(canvas, &camera, way.centre, 1.0);
+    }
+}
+
+/// The space that the motion of b needs.
+struct Way {
+    places: Vec<Vector3<f64>>,
+    centre: Vector3<f64>,
+    /// Half the diagonal of the box about the places.
+    radius: f64,
+}
+
+impl Way {
+    fn new(places: &[Vector3<f64>]) -> Self {
+        let mut corners = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+        for place in places {
+            corners = [corners[0].inf(place), corners[1].sup(place)];
+        }
+        let [low, high] = corners;
+        Self { places: places.to_vec(), centre: 0.5 * (low + high), radius: 0.5 * (high - low).norm() }
+    }
+
+    /// Returns the coordinate in the direction `toward` beyond which points are in front of all places.
+    fn front(&self, toward: &Vector3<f64>) -> f64 {
+        self.places.iter().map(|place| toward.dot(place)).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// Paints the points of a scan for which `is_shown` is `true`.
+fn paint_scan(
+    canvas: &mut Canvas,
+    camera: &Camera,
+    view: &Placed<'_>,
+    (colour, is_shown): (Colour, impl Fn(Vector3<f64>) -> bool),
+    style: &Style,
+) {
+    for i in (0..view.scan().len()).filter(|&i| is_shown(view.point(i).into())) {
         let disc = splat(view, i);
         let disc = Splat { radius: disc.radius.min(LARGEST / camera.scale), ..disc };
         canvas.splat(camera, &if style.points { dot(&disc, camera, POINT) } else { disc }, colour);
@@ -295,7 +376,7 @@ fn plot(
         canvas.line(area, [[axes.x(hit), frame[2]], [axes.x(hit), strip + 8.0 * fine]], 3.0, HIT);
         label(canvas, area, [axes.x(hit) + 6.0 * fine, frame[2]], &format!("impact at t = {}", time(hit)));
     }
-    title(canvas, area, "Distance over t: coloured at most, thin at least, green strip proven free");
+    title(canvas, area, "Distance over t, between both lines; the thin one and the green strip are proven");
 }
 
 /// Writes text beside a place: to the right of it for `share` 0, to the left for 1.

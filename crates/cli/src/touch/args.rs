@@ -15,7 +15,7 @@ pub struct TouchArgs {
     /// Shapes in world units, one JSON object on each line; `-` reads standard input
     ///
     /// `{"sphere":{"centre":[x,y,z],"radius":r}}`,
-    /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}`, `{"box":{"pose":[16
+    /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}`, `{"box":{"pose":[16, 12 or 7
     /// numbers],"half":[x,y,z]}}`, `{"cylinder":{"pose":[…],"half_height":h,"radius":r}}` about the y
     /// axis of its pose, `{"cone":{…}}` alike with its tip at the top,
     /// `{"hull":{"points":[[x,y,z],…]}}`, `{"triangle":{"points":[…]}}` or

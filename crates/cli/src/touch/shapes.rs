@@ -9,8 +9,9 @@ use serde::de::IgnoredAny;
 
 use crate::digits::short;
 use crate::error::CliError;
-use crate::input::TextLines;
-use crate::matrix::PoseRefused;
+use crate::json_lines::JsonLines;
+use crate::matrix::{Matrix, PoseRefused};
+use crate::pose_text::JsonPose;
 
 /// The form of a line, for messages.
 const SHAPE_LINE: &str =
@@ -54,7 +55,7 @@ struct CapsuleLine {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct BoxLine {
-    pose: [f64; 16],
+    pose: JsonPose,
     half: [f64; 3],
     #[serde(default, alias = "rounding")]
     radius: f64,
@@ -64,7 +65,7 @@ struct BoxLine {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RoundLine {
-    pose: [f64; 16],
+    pose: JsonPose,
     half_height: f64,
     radius: f64,
     #[serde(default)]
@@ -127,6 +128,9 @@ impl ShapeLine {
         add(self.segment.map(SegmentLine::read));
         match (shapes.pop(), shapes.len(), self.others.keys().next()) {
             (Some(shape), 0, _) => shape,
+            (None, _, Some(_)) if self.others.contains_key("type") => {
+                Err(format!("expected the name of the shape as the key, got `type`; {SHAPE_LINE}"))
+            }
             (None, _, Some(name)) => {
                 let name: String = name.chars().take(40).flat_map(char::escape_debug).collect();
                 Err(format!("unknown shape `{name}`; known: {}", SHAPES.join(", ")))
@@ -199,10 +203,11 @@ impl SegmentLine {
     }
 }
 
-/// Makes a pose of a matrix. `half` are half the edge lengths of what it places.
-fn pose(matrix: &[f64; 16], half: [f64; 3], r: f64) -> Result<Pose, String> {
+/// Makes a pose of its numbers. `half` are half the edge lengths of what it places.
+fn pose(given: &JsonPose, half: [f64; 3], r: f64) -> Result<Pose, String> {
+    let matrix: Matrix = given.matrix().map_err(|what| format!("`pose`: {what}"))?;
     let bounds = Aabb { min: half.map(|h| -h), max: half };
-    Pose::from_row_major(matrix, &bounds, 0.1 * r).map_err(|cause| format!("`pose`: {}", refused(cause)))
+    Pose::from_row_major(&matrix, &bounds, 0.1 * r).map_err(|cause| format!("`pose`: {}", refused(cause)))
 }
 
 fn refused(cause: PoseError) -> PoseRefused {
@@ -219,34 +224,23 @@ fn positive(name: &str, length: f64) -> Result<f64, String> {
 
 /// A file with a shape on each line.
 pub(super) struct ShapeFile {
-    lines: TextLines,
-    /// `true` until a line with a shape has been read.
-    is_empty: bool,
+    lines: JsonLines,
 }
 
 impl ShapeFile {
     pub(super) fn open(path: &Path) -> Result<Self, CliError> {
-        Ok(Self { lines: TextLines::open(path)?, is_empty: true })
+        Ok(Self { lines: JsonLines::open(path, "shapes", SHAPE_LINE)? })
     }
 
-    /// Returns the number of the next line that is not blank, counted from 1, and its text.
+    /// Returns the number of the next line with a shape, counted from 1, and its text.
     pub(super) fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
-        let line = self.lines.next_filled()?;
-        if line.is_none() && self.is_empty {
-            return Err(self.lines.unsuitable(format!("expected shapes, got none; {SHAPE_LINE}")));
-        }
-        self.is_empty = false;
-        Ok(line)
+        self.lines.next_line()
     }
 
     /// Parses the shape on line `number`, whose text is `text`. The pose of a solid may deviate from a
     /// rotation by a tenth of `r`.
     pub(super) fn shape(&self, number: u64, text: &str, r: f64) -> Result<ReadShape, CliError> {
-        let line: ShapeLine = serde_json::from_str(text).map_err(|e| {
-            let message = e.to_string();
-            let what = message.split(" at line ").next().unwrap_or_default();
-            self.lines.fault_on(number, format!("column {}: {what}; {SHAPE_LINE}", e.column()))
-        })?;
+        let line: ShapeLine = self.lines.parse(number, text)?;
         line.read(r).map_err(|what| self.lines.fault_on(number, what))
     }
 

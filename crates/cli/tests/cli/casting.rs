@@ -22,7 +22,7 @@ fn rays_hit_a_ball_where_it_is() {
     let pose = shift(3.0, 0.0, 0.0);
     let asked = ["cast", "ball.xyz", "--rays", "rays.jsonl", "--pose", &pose, "--json"];
     let told = place.ok(&asked).json();
-    assert_eq!(keys(&told[0]), sorted("t point normal evidence micros"));
+    assert_eq!(keys(&told[0]), sorted("t point normal source evidence micros"));
     for (line, expected) in told.iter().zip([Some(1.0), Some(2.0), None, Some(1.75), None]) {
         let t = line["t"].as_f64();
         assert_eq!(t.is_some(), expected.is_some(), "{line} for {expected:?}");
@@ -59,14 +59,14 @@ fn what_is_no_ray_is_refused_with_its_line() {
         (r#"{"origin":[0,0,0]}"#, &["line 2", "direction"]),
         (r#"{"origin":[0,0,0],"direction":[0,0,1],"max":-1}"#, &["line 2", "`max`"]),
         (r#"{"origin":[0,0,0],"direction":[0,0,1],"radius":-1}"#, &["line 2", "`radius`"]),
-        ("ray", &["line 2", "column 1"]),
+        ("ray", &["line 2", "expected an object in {}"]),
     ] {
         place.write("rays.jsonl", format!("{good}\n{line}\n"));
         place.refused(1, &["cast", "ball.xyz", "--rays", "rays.jsonl"], words);
     }
     place.write("rays.jsonl", "\n");
     place.refused(1, &["cast", "ball.xyz", "--rays", "rays.jsonl"], &["expected rays, got none", "origin"]);
-    place.refused(2, &["cast", "ball.xyz"], &["--rays"]);
+    place.refused(2, &["cast", "ball.xyz"], &["--rays", "--image"]);
 }
 
 #[test]

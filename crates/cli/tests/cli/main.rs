@@ -28,4 +28,5 @@ mod running;
 mod sampling;
 mod slicing;
 mod sweeping;
+mod terminal;
 mod touching;

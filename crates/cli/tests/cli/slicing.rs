@@ -361,7 +361,7 @@ fn what_does_not_serve_is_refused_by_name() {
         (1, vec!["slices", "build", "house.xyz", "-o", "."], &["other files"]),
         (1, vec!["slices", "inspect", "."], &["index.nms", "no such file"]),
         (1, query("boxes.jsonl"), &["boxes.jsonl", "line 2", "column"]),
-        (1, query("empty.jsonl"), &["expected lines, got none"]),
+        (1, query("empty.jsonl"), &["expected boxes, got none"]),
         (1, query("inside.jsonl"), &["line 1", "min at most max"]),
         (2, vec!["slices", "query", "house"], &["--boxes"]),
         (

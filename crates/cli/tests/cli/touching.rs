@@ -11,7 +11,8 @@ const SHAPES: &str = r#"
 
 {"capsule":{"ends":[[0,0,0],[1.5,0,0]],"radius":0.25}}
 {"capsule":{"ends":[[0,0,0],[2.5,0,0]],"radius":0.25}}
-{"box":{"pose":[1,0,0,3, 0,1,0,0, 0,0,1,3, 0,0,0,1],"half":[0.5,0.5,0.75]}}
+# A box above the ball, by a quaternion, and one that cuts it.
+{"box":{"pose":[3,0,3, 0,0,0,1],"half":[0.5,0.5,0.75]}}
 {"box":{"pose":[0,-1,0,3, 1,0,0,0, 0,0,1,0, 0,0,0,1],"half":[2,2,0.1]}}
 "#;
 
@@ -69,7 +70,10 @@ fn what_is_no_shape_is_refused_with_its_line() {
             r#"{"box":{"pose":[1,0,0,0,0,2,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1]}}"#,
             &["line 2", "pose", "rotation"],
         ),
-        ("sphere", &["line 2", "column 1"]),
+        ("sphere", &["line 2", "expected an object in {}"]),
+        (r#"{"type":"sphere","radius":1}"#, &["line 2", "as the key, got `type`", r#"{"sphere":"#]),
+        (r#"{"box":{"pose":[0,0,0,1],"half":[1,1,1]}}"#, &["line 2", "`pose`", "7 (x y z qx qy qz qw), got 4"]),
+        (r#"{"sphere":{"centre":[0,0,0],"radius":"big"}}"#, &["line 2", "expected a number"]),
     ] {
         place.write("shapes.jsonl", format!("{good}\n{line}\n"));
         place.refused(1, &["touch", "ball.xyz", "--shapes", "shapes.jsonl"], words);
