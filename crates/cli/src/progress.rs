@@ -97,7 +97,7 @@ impl Console {
 }
 
 /// Returns a bar with the share that is done, the number of things per second and the time left;
-/// the number of things and the time so far if the share is unknown.
+/// the number of things, if any, and the time so far if the share is unknown.
 fn line(what: &str, things: &str, told: Told, seconds: f64) -> String {
     #[expect(
         clippy::cast_precision_loss,
@@ -107,6 +107,9 @@ fn line(what: &str, things: &str, told: Told, seconds: f64) -> String {
     )]
     let rate = grouped((told.count as f64 / seconds) as u64);
     let Some(share) = told.share.map(|share| share.clamp(0.0, 1.0)) else {
+        if told.count == 0 {
+            return format!("{what}, {}", duration(seconds));
+        }
         return format!("{what}: {} {things}, {rate}/s, {}", grouped(told.count), duration(seconds));
     };
     let left = if share > 0.0 {
@@ -185,6 +188,7 @@ mod tests {
         assert!(line("preparing", "points", told, 2.0).ends_with(" points/s, at most 6s left"));
         let told = Told { count: 30, ..Told::default() };
         assert_eq!(line("answering", "poses", told, 2.0), "answering: 30 poses, 15/s, 2s");
+        assert_eq!(line("reading part.obj", "points", Told::default(), 2.0), "reading part.obj, 2s");
         let told = Told { share: Some(0.0), ..Told::default() };
         assert!(line("answering", "poses", told, 2.0).ends_with("] 0 %, 2s"));
         let told = Told { share: Some(1.5), count: 7, may_end_early: false };

@@ -1,6 +1,6 @@
 //! Answers about two scans: a record in arrays, and a class with the same names for one question.
 
-use nearmiss::{Evidence, Reason, Verdict};
+use nearmiss::{Evidence, MeshVerdict, Reason, Verdict};
 use pyo3::prelude::*;
 
 use crate::codes::{
@@ -82,8 +82,37 @@ impl AnswerRecord {
     }
 }
 
+impl AnswerRecord {
+    /// The answer with both sides exchanged.
+    pub(crate) const fn swapped(self) -> Self {
+        let Self { normal_a, normal_b, source_a, source_b, .. } = self;
+        Self { normal_a: normal_b, normal_b: normal_a, source_a: source_b, source_b: source_a, ..self }
+    }
+
+    /// An answer about two meshes, which is exact unless it is undecided. Sources are triangles.
+    pub(crate) fn of_meshes(answer: &nearmiss::MeshAnswer) -> Self {
+        let mut record =
+            Self { likelihood: answer.likelihood, ..Self::new(&nearmiss::Answer::UNASKED) };
+        (record.band, record.reason) = (0.0, 0);
+        let statistics = answer.statistics;
+        (record.node_pairs, record.leaf_pairs) = (statistics.node_pairs, statistics.leaf_pairs);
+        match answer.verdict {
+            MeshVerdict::Intersecting(contact) => {
+                let best = MeshContactRecord::new(&contact);
+                (record.verdict, record.evidence, record.residual) = (1, 1, 0.0);
+                (record.witness, record.normal_a, record.normal_b) = (best.point, best.normal_a, best.normal_b);
+                (record.source_a, record.source_b) = (best.triangle_a, best.triangle_b);
+            }
+            MeshVerdict::Separated => (record.verdict, record.evidence) = (0, 1),
+            MeshVerdict::Pose => record.reason = reason_code(Reason::Pose),
+            _ => record.reason = reason_code(Reason::Budget { likelihood: answer.likelihood }),
+        }
+        record
+    }
+}
+
 answer! {
-    /// The answer of `Scan.collide`.
+    /// The answer of `collide`.
     Answer of AnswerRecord by answer_in_words {
         @verdict touches: ["separated", "intersecting"],
         evidence: Option<&'static str> = evidence_name,
@@ -155,7 +184,7 @@ impl DistanceRecord {
 }
 
 answer! {
-    /// The answer of `Scan.distance`.
+    /// The answer of `distance`.
     Distance of DistanceRecord by distance_in_words {
         lower: f64 = plain,
         upper: f64 = plain,
@@ -176,6 +205,56 @@ fn distance_in_words(record: &DistanceRecord) -> String {
     format!("between {} and {}{}", record.lower, record.upper, shown(record.evidence))
 }
 
+impl DistanceRecord {
+    /// The distance with both sides exchanged.
+    pub(crate) const fn swapped(self) -> Self {
+        let Self { point_a, point_b, source_a, source_b, .. } = self;
+        Self { point_a: point_b, point_b: point_a, source_a: source_b, source_b: source_a, ..self }
+    }
+
+    /// The distance of two meshes, which is exact. Sources are triangles.
+    pub(crate) fn of_meshes(distance: &nearmiss::MeshDistance) -> Self {
+        let [point_a, point_b] = distance.points;
+        let [source_a, source_b] = distance.triangles.map(i64::from);
+        let statistics = distance.statistics;
+        Self {
+            point_a,
+            point_b,
+            lower: distance.lower,
+            upper: distance.upper,
+            band: 0.0,
+            source_a,
+            source_b,
+            evaluations: 0,
+            node_pairs: statistics.node_pairs,
+            leaf_pairs: statistics.leaf_pairs,
+            evidence: 1,
+            complete: distance.complete.into(),
+            _padding: [0; 6],
+        }
+    }
+}
+
+record! {
+    /// A contact of two triangles.
+    MeshContactRecord {
+        point: [f64; 3] = "3f8",
+        ends: [[f64; 3]; 2] = "(2,3)f8",
+        normal_a: [f64; 3] = "3f8",
+        normal_b: [f64; 3] = "3f8",
+        triangle_a: i64 = "i8",
+        triangle_b: i64 = "i8",
+    }
+}
+
+impl MeshContactRecord {
+    pub(crate) fn new(contact: &nearmiss::MeshContact) -> Self {
+        let [normal_a, normal_b] = contact.normals;
+        let [triangle_a, triangle_b] = contact.triangles.map(i64::from);
+        Self { point: contact.point, ends: contact.ends, normal_a, normal_b, triangle_a, triangle_b }
+    }
+}
+
 record! {
     /// A contact of all contacts of two scans.
     ContactRecord {
@@ -193,6 +272,47 @@ impl ContactRecord {
         let [normal_a, normal_b] = contact.normals.unwrap_or([NOWHERE; 2]);
         let [source_a, source_b] = contact.sources.map(|source| i64::from(source.0));
         Self { point: contact.point, normal_a, normal_b, residual: contact.residual, source_a, source_b }
+    }
+}
+
+record! {
+    /// A clash.
+    ClashRecord {
+        centre: [f64; 3] = "3f8",
+        size: [f64; 3] = "3f8",
+        lower: f64 = "f8",
+        upper: f64 = "f8",
+        point: [f64; 3] = "3f8",
+        residual: f64 = "f8",
+        source_a: i64 = "i8",
+        source_b: i64 = "i8",
+        contacts: u64 = "u8",
+        surroundings: u64 = "u8",
+        hard: u8 = "?",
+        evidence: i8 = "i1",
+        _padding: [u8; 6] = "6u1",
+    }
+}
+
+impl ClashRecord {
+    /// `contacts` are those of all clashes.
+    pub(crate) fn new(clash: &nearmiss::Clash, contacts: &[nearmiss::Contact]) -> Self {
+        let best = ContactRecord::new(&contacts[clash.group.nearest]);
+        Self {
+            centre: clash.group.centre(),
+            size: clash.group.size(),
+            lower: clash.lower,
+            upper: clash.upper,
+            point: best.point,
+            residual: best.residual,
+            source_a: best.source_a,
+            source_b: best.source_b,
+            contacts: clash.group.contacts.len() as u64,
+            surroundings: clash.surroundings.len() as u64,
+            hard: (clash.kind == nearmiss::ClashKind::Hard).into(),
+            evidence: evidence_code(clash.evidence),
+            _padding: [0; 6],
+        }
     }
 }
 

@@ -98,6 +98,30 @@ impl<'py> Points<'py> {
     }
 }
 
+/// Reads an array of indices of shape (N, 3).
+pub(crate) fn corners(given: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
+    const EXPECTED: &str = "an array of vertex indices of shape (N, 3)";
+    let array = numpy(given.py())?.call_method1("ascontiguousarray", (given,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if kind != "i" && kind != "u" {
+        return Err(refused(format!("expected {EXPECTED}, got numbers that are no integers")));
+    }
+    let array = array.call_method1("astype", ("int64",))?;
+    let array = array.extract::<PyReadonlyArray2<'_, i64>>().map_err(|_shape| wrong_shape(EXPECTED, given))?;
+    if array.shape()[1] != 3 {
+        return Err(wrong_shape(EXPECTED, given));
+    }
+    let rows = array.as_slice().map_err(refused)?.as_chunks::<3>().0.iter().enumerate();
+    let row = |(i, row): (usize, &[i64; 3])| {
+        let [a, b, c] = row.map(u32::try_from);
+        match (a, b, c) {
+            (Ok(a), Ok(b), Ok(c)) => Ok([a, b, c]),
+            _ => Err(refused(format!("expected indices from 0 to 4294967295, got {row:?} (triangle {i})"))),
+        }
+    };
+    rows.map(row).collect()
+}
+
 /// Returns the error of an array of the wrong shape.
 pub(crate) fn wrong_shape(expected: &str, given: &Bound<'_, PyAny>) -> PyErr {
     let shape = numpy(given.py()).and_then(|numpy| numpy.call_method1("shape", (given,)));

@@ -19,8 +19,10 @@ mod recipe;
 mod shape;
 
 mod cloud;
+mod each;
 mod hint;
 mod scan;
+mod mesh;
 mod slices;
 mod sweep;
 mod target;
@@ -34,6 +36,8 @@ mod _native {
     use super::cloud::{point_cloud2, read_points};
     #[pymodule_export]
     use super::hint::{Hint, ShapeHint};
+    #[pymodule_export]
+    use super::mesh::Mesh;
     #[pymodule_export]
     use super::scan::Scan;
     #[pymodule_export]

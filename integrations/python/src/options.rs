@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use nearmiss::{Budget, CollideOptions, Deadline, Detail, Evidence, Metric, Scan, Semantics};
+use nearmiss::{Budget, CollideOptions, Deadline, Detail, Evidence, MeshQuality, Metric, Scan, Semantics};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -13,6 +13,8 @@ use crate::failure::refused;
 pub(crate) struct Options {
     pub(crate) collide: CollideOptions,
     pub(crate) relative: f64,
+    /// How well meshes are tested; `None` for exactly.
+    pub(crate) quality: Option<MeshQuality>,
     work: Option<u64>,
     seconds: Option<f64>,
 }
@@ -20,6 +22,15 @@ pub(crate) struct Options {
 /// The names of options for two scans.
 pub(crate) const OF_SCANS: &[&str] =
     &["margin", "thickened", "surface_only", "evidence", "detail", "work", "seconds"];
+
+/// The names of options that say what a scan means.
+pub(crate) const OF_MEANING: &[&str] = &["thickened", "surface_only"];
+
+/// The names of options for two meshes.
+pub(crate) const OF_MESHES: &[&str] = &["p_min", "k_min", "work", "seconds"];
+
+/// The names of options that limit a question.
+pub(crate) const OF_BUDGET: &[&str] = &["work", "seconds"];
 
 /// The names of options for a distance.
 pub(crate) const OF_DISTANCE: &[&str] = &["thickened", "surface_only", "relative", "work", "seconds"];
@@ -40,7 +51,7 @@ impl Options {
         metric: Metric,
     ) -> PyResult<Self> {
         let mut options =
-            Self { collide: CollideOptions::default(), relative: 0.1, work: None, seconds: None };
+            Self { collide: CollideOptions::default(), relative: 0.1, quality: None, work: None, seconds: None };
         if metric == Metric::Geodesic {
             options.collide = options.collide.with_semantics(Semantics::Surface);
         }
@@ -86,6 +97,20 @@ impl Options {
                         )));
                     }
                 });
+            }
+            "p_min" => {
+                let p_min: f64 = value.extract()?;
+                if !(0.0..=1.0).contains(&p_min) {
+                    return Err(refused(format!("expected p_min from 0 to 1, got {p_min}")));
+                }
+                self.quality = Some(self.quality.unwrap_or_default().with_p_min(p_min));
+            }
+            "k_min" => {
+                let k_min: u32 = value.extract()?;
+                if k_min == 0 {
+                    return Err(refused("expected k_min of at least 1, got 0"));
+                }
+                self.quality = Some(self.quality.unwrap_or_default().with_k_min(k_min));
             }
             "relative" => self.relative = value.extract()?,
             "work" => self.work = Some(value.extract()?),

@@ -1,6 +1,6 @@
 //! Poses: 4×4 matrices, rotations with `as_matrix()`, and pairs of a rotation and a translation.
 
-use nearmiss::{Pose, Scan};
+use nearmiss::{Aabb, Mesh, Pose, Scan};
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -10,8 +10,40 @@ use crate::failure::refused;
 /// A row-major 4×4 matrix.
 pub(crate) type Matrix = [f64; 16];
 
-/// The share of the sampling radius by which making a matrix a pose may move the bounds of a scan.
-const TOLERANCE: f64 = 0.1;
+/// The share of the sampling radius by which making a matrix a pose may move the bounds of a scan, and
+/// the share of their diagonal for a mesh: those of the command line.
+const OF_RADIUS: f64 = 0.1;
+const OF_DIAGONAL: f64 = 1e-4;
+
+/// A thing that poses place.
+pub(crate) trait Placeable: Sync {
+    /// Returns the bounds in the frame of the input.
+    fn bounds(&self) -> &Aabb;
+
+    /// Returns the length by which making a matrix a pose may move the bounds.
+    fn tolerance(&self) -> f64;
+}
+
+impl Placeable for Scan {
+    fn bounds(&self) -> &Aabb {
+        nearmiss::PointHierarchy::bounds(self)
+    }
+
+    fn tolerance(&self) -> f64 {
+        OF_RADIUS * self.sampling_radius()
+    }
+}
+
+impl Placeable for Mesh {
+    fn bounds(&self) -> &Aabb {
+        nearmiss::MeshHierarchy::bounds(self)
+    }
+
+    fn tolerance(&self) -> f64 {
+        let sum: f64 = Placeable::bounds(self).half_extents().iter().map(|half| half * half).sum();
+        2.0 * OF_DIAGONAL * sum.sqrt()
+    }
+}
 
 /// One pose or many.
 pub(crate) enum Poses<'py> {
@@ -51,10 +83,10 @@ impl<'py> Poses<'py> {
         }
     }
 
-    /// Returns the one pose of `scan`; fails for many.
-    pub(crate) fn one(&self, scan: &Scan) -> PyResult<Pose> {
+    /// Returns the one pose of `thing`; fails for many.
+    pub(crate) fn one(&self, thing: &(impl Placeable + ?Sized)) -> PyResult<Pose> {
         match self {
-            Self::One(matrix) => pose_of(matrix, scan).map_err(refused),
+            Self::One(matrix) => pose_of(matrix, thing).map_err(refused),
             Self::Many(_) => Err(refused(
                 "expected one pose of shape (4, 4) here, got an array of poses; ask once for each pose",
             )),
@@ -70,26 +102,62 @@ impl<'py> Poses<'py> {
     }
 }
 
-/// Returns the pose that a matrix is for `scan`, as the command line does: the nearest rotation with
-/// uniform scale, refused if that moves the bounds of the scan by more than a tenth of its sampling
-/// radius.
-pub(crate) fn pose_of(matrix: &Matrix, scan: &Scan) -> Result<Pose, nearmiss::PoseError> {
+/// Returns the pose that a matrix is for `thing`, as the command line does: the nearest rotation with
+/// uniform scale, refused if that moves the bounds by more than their tolerance.
+pub(crate) fn pose_of(matrix: &Matrix, thing: &(impl Placeable + ?Sized)) -> Result<Pose, nearmiss::PoseError> {
     // Rounding alone never moves the bounds so far, and is tested in a tenth of the time.
     Pose::from_matrix(matrix).or_else(|_| {
         let [x, y, z] = [0, 1, 2].map(|i| [matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]]);
         let determinant = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
             + x[2] * (y[0] * z[1] - y[1] * z[0]);
-        let tolerance = TOLERANCE * scan.sampling_radius() * determinant.abs().cbrt();
-        Pose::from_row_major(matrix, scan.bounds(), tolerance)
+        let tolerance = thing.tolerance() * determinant.abs().cbrt();
+        Pose::from_row_major(matrix, thing.bounds(), tolerance)
     })
 }
 
 /// Checks every matrix, so that a batch need not: an error names the first one that is not a pose.
-pub(crate) fn check_each(matrices: &[Matrix], scan: &Scan) -> PyResult<()> {
+pub(crate) fn check_each(matrices: &[Matrix], thing: &(impl Placeable + ?Sized)) -> PyResult<()> {
     for (index, matrix) in matrices.iter().enumerate() {
-        if let Err(cause) = pose_of(matrix, scan) {
+        if let Err(cause) = pose_of(matrix, thing) {
             return Err(refused(format!("pose {index}: {cause}")));
         }
     }
     Ok(())
+}
+
+/// The poses of both things of a batch; one pose serves all.
+pub(crate) struct PosePairs<'a> {
+    matrices: [&'a [Matrix]; 2],
+    things: [&'a dyn Placeable; 2],
+}
+
+impl<'a> PosePairs<'a> {
+    pub(crate) fn new(poses: &'a [Poses<'_>; 2], things: [&'a dyn Placeable; 2]) -> PyResult<Self> {
+        let matrices = [poses[0].matrices()?, poses[1].matrices()?];
+        let [a, b] = matrices.map(<[Matrix]>::len);
+        if a != b && a != 1 && b != 1 {
+            return Err(refused(format!("expected as many poses of both, or one pose for all, got {a} and {b}")));
+        }
+        Ok(Self { matrices, things })
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        let [a, b] = self.matrices.map(<[Matrix]>::len);
+        if a == 1 { b } else { a }
+    }
+
+    /// The `i`-th poses; `None` if a matrix is no pose.
+    pub(crate) fn at(&self, i: usize) -> Option<[Pose; 2]> {
+        let pose = |side: usize| {
+            let matrices = self.matrices[side];
+            pose_of(&matrices[if matrices.len() == 1 { 0 } else { i }], self.things[side]).ok()
+        };
+        Some([pose(0)?, pose(1)?])
+    }
+
+    /// Returns the error of the first matrix that is no pose.
+    pub(crate) fn fault(&self) -> PyErr {
+        let checked = (0..2).try_for_each(|side| check_each(self.matrices[side], self.things[side]));
+        checked.err().unwrap_or_else(|| refused("expected poses, got other matrices"))
+    }
 }

@@ -3,20 +3,22 @@
 use std::path::PathBuf;
 
 use nearmiss::{
-    Answer as ScanAnswer, Check, CollidePlan, Contacts, DistanceOptions, DistancePlan, Pair, Pose,
+    Check, ClashOptions, ClashPlan, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, DistanceOptions, DistancePlan, Pair, Pose,
     Scan as Prepared,
 };
+use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
-use crate::answers::{Answer, AnswerRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord};
+use crate::answers::{Answer, AnswerRecord, ClashRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord};
+use crate::each::{each_answer, each_distance};
 use crate::arrays::Points;
 use crate::cloud::rows;
 use crate::failure::{refused, unloadable, unreadable, unwritable};
 use crate::hint::{Hint, busy};
-use crate::options::{OF_DISTANCE, OF_SCANS, OF_SHAPES, Options};
-use crate::pool::{ask, ask_each};
-use crate::poses::{Matrix, Poses, check_each, pose_of};
+use crate::options::{OF_DISTANCE, OF_MEANING, OF_SCANS, OF_SHAPES, Options};
+use crate::pool::ask;
+use crate::poses::{PosePairs, Poses};
 use crate::recipe::Recipe;
 use crate::record::array;
 use crate::target::Target;
@@ -26,46 +28,8 @@ use crate::target::Target;
 #[derive(Debug)]
 pub(crate) struct Scan(pub(crate) Prepared);
 
-/// The poses of both scans of a batch; one pose serves all.
-pub(crate) struct PosePairs<'a> {
-    matrices: [&'a [Matrix]; 2],
-    scans: [&'a Prepared; 2],
-}
-
-impl<'a> PosePairs<'a> {
-    pub(crate) fn new(matrices: [&'a [Matrix]; 2], scans: [&'a Prepared; 2]) -> PyResult<Self> {
-        let [a, b] = matrices.map(<[Matrix]>::len);
-        if a != b && a != 1 && b != 1 {
-            return Err(refused(format!(
-                "expected as many poses of both scans, or one of one of them, got {a} and {b}"
-            )));
-        }
-        Ok(Self { matrices, scans })
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        let [a, b] = self.matrices.map(<[Matrix]>::len);
-        if a == 1 { b } else { a }
-    }
-
-    /// The `i`-th pair; `None` if a matrix is no pose.
-    pub(crate) fn pair(&self, i: usize) -> Option<Pair<'a>> {
-        let pose = |side: usize| {
-            let matrices = self.matrices[side];
-            pose_of(&matrices[if matrices.len() == 1 { 0 } else { i }], self.scans[side]).ok()
-        };
-        Some(Pair::new(self.scans[0].at(&pose(0)?), self.scans[1].at(&pose(1)?)))
-    }
-
-    /// Returns the error of the first matrix that is no pose.
-    pub(crate) fn fault(&self) -> PyErr {
-        let checked = (0..2).try_for_each(|side| check_each(self.matrices[side], self.scans[side]));
-        checked.err().unwrap_or_else(|| refused("expected poses, got other matrices"))
-    }
-}
-
 /// Reads how files are checked.
-fn check_of(name: &str) -> PyResult<Check> {
+pub(crate) fn check_of(name: &str) -> PyResult<Check> {
     match name {
         "full" => Ok(Check::Full),
         "structure" => Ok(Check::Structure),
@@ -306,15 +270,11 @@ impl Scan {
         let (py, other) = (other.py(), other.get());
         let (plan, options) = self.plan(other, options)?;
         let poses = [Poses::new(own_poses)?, Poses::new(Some(poses))?];
-        let pairs = PosePairs::new([poses[0].matrices()?, poses[1].matrices()?], [&self.0, &other.0])?;
-        let answers = ask_each(py, pairs.len(), |i, scratch| match pairs.pair(i) {
-            Some(pair) => AnswerRecord::new(&pair.within(&options.budget()).collide(&plan, scratch)),
-            None => AnswerRecord { verdict: INVALID, ..AnswerRecord::new(&ScanAnswer::UNASKED) },
-        })?;
-        if answers.iter().any(|answer| answer.verdict == INVALID) {
-            return Err(pairs.fault());
-        }
-        array(py, answers)
+        let pairs = PosePairs::new(&poses, [&self.0, &other.0])?;
+        each_answer(py, &pairs, |[a, b], scratch| {
+            let pair = Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget());
+            AnswerRecord::new(&pair.collide(&plan, scratch))
+        })
     }
 
     /// Bound the distance of this scan, at `own_pose`, and `other`, at `pose`: lower ≤ distance ≤
@@ -353,16 +313,11 @@ impl Scan {
         let (py, other) = (other.py(), other.get());
         let (plan, options) = self.distance_plan(other, options)?;
         let poses = [Poses::new(own_poses)?, Poses::new(Some(poses))?];
-        let pairs = PosePairs::new([poses[0].matrices()?, poses[1].matrices()?], [&self.0, &other.0])?;
-        let distances = ask_each(py, pairs.len(), |i, scratch| {
-            let distance = pairs.pair(i).map(|pair| pair.within(&options.budget()).distance(&plan, scratch));
-            distance.map_or_else(bytemuck::Zeroable::zeroed, |distance| DistanceRecord::new(&distance))
-        })?;
-        // The band of an answer is above 0.
-        if distances.iter().any(|distance| distance.band == 0.0) {
-            return Err(pairs.fault());
-        }
-        array(py, distances)
+        let pairs = PosePairs::new(&poses, [&self.0, &other.0])?;
+        each_distance(py, &pairs, |[a, b], scratch| {
+            let pair = Pair::new(self.0.at(&a), other.0.at(&b)).within(&options.budget());
+            DistanceRecord::new(&pair.distance(&plan, scratch))
+        })
     }
 
     /// Return a contact of each pair of leaves that touch, as a structured array of shape (N,).
@@ -419,6 +374,74 @@ impl Scan {
         array(py, found.iter().map(ManifoldRecord::new).collect())
     }
 
+    /// List the places where this scan, at `own_pose`, touches `other`, at `pose`, or comes nearer than
+    /// `clearance`: groups of contacts that are at most `link` apart.
+    ///
+    /// Returns a structured array of shape (N,), the hard clashes first, then the greatest ones. Its
+    /// fields are `hard` (false if they only come nearer than the clearance), `centre` and `size` of the
+    /// box about the contacts, `lower` and `upper` (bounds of the least distance), `evidence`,
+    /// `contacts` and `surroundings` (their numbers), and of the best contact `point`, `residual`,
+    /// `source_a` and `source_b`. Options: `thickened` and `surface_only`. Warns if the clearance is so
+    /// great that the search ended early.
+    #[pyo3(signature = (other, pose = None, own_pose = None, *, clearance = 0.0, link = None, **options))]
+    #[expect(clippy::too_many_arguments, reason = "names in Python")]
+    fn clashes<'py>(
+        &self,
+        other: &Bound<'py, Self>,
+        pose: Option<&Bound<'py, PyAny>>,
+        own_pose: Option<&Bound<'py, PyAny>>,
+        clearance: f64,
+        link: Option<f64>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, other) = (other.py(), other.get());
+        let options = Options::new(options, OF_MEANING, &self.0)?;
+        let asked = ClashOptions::default()
+            .with_clearance(clearance)
+            .with_semantics(options.collide.semantics);
+        let asked = link.map_or(asked, |link| asked.with_link(link));
+        let plan = ClashPlan::new(&asked, &self.0, &other.0).map_err(refused)?;
+        let [a, b] = self.both(other, pose, own_pose)?;
+        let found = ask(py, |scratch| Pair::new(self.0.at(&a), other.0.at(&b)).clashes(&plan, scratch));
+        if !found.complete {
+            let what = c"the search ended early, so clashes may be missing; ask for a smaller clearance";
+            PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), what, 1)?;
+        }
+        array(py, found.clashes.iter().map(|clash| ClashRecord::new(clash, &found.contacts)).collect())
+    }
+
+    /// Find all curves in which the surfaces of this scan, at `own_pose`, and of `other`, at `pose`,
+    /// intersect.
+    ///
+    /// Returns a list of arrays of shape (N, 3), one for each curve; the last point of a closed one is
+    /// its first. `spacing` is the distance of successive points (by default two sampling radii),
+    /// `tolerance` the greatest distance from either surface.
+    #[pyo3(signature = (other, pose = None, own_pose = None, *, spacing = None, tolerance = None))]
+    fn curves<'py>(
+        &self,
+        other: &Bound<'py, Self>,
+        pose: Option<&Bound<'py, PyAny>>,
+        own_pose: Option<&Bound<'py, PyAny>>,
+        spacing: Option<f64>,
+        tolerance: Option<f64>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let (py, other) = (other.py(), other.get());
+        let mut options = CurveOptions::default();
+        (options.spacing, options.tolerance) = (spacing, tolerance);
+        let plan = CurvePlan::new(&options, &self.0, &other.0).map_err(refused)?;
+        let [a, b] = self.both(other, pose, own_pose)?;
+        let mut found = Curves::default();
+        ask(py, |scratch| Pair::new(self.0.at(&a), other.0.at(&b)).curves(&plan, &mut found, scratch));
+        let points = |curve: &nearmiss::Curve| {
+            let points = &found.points[curve.first..][..curve.count];
+            let again = points.first().filter(|_| curve.is_closed());
+            let flat: Vec<f64> = points.iter().chain(again).flatten().copied().collect();
+            let count = flat.len() / 3;
+            rows(py, flat, &[count, 3])
+        };
+        found.curves.iter().map(points).collect()
+    }
+
     /// Place the scan at `pose` of shape (4, 4), for questions about shapes and rays.
     ///
     /// Options: `margin`, `thickened`, `surface_only`, `evidence` and `detail`, as for `collide`.
@@ -432,6 +455,3 @@ impl Scan {
         Target::new(&self.0, Poses::new(pose)?.one(&self.0)?, &options)
     }
 }
-
-/// The verdict of a query with a matrix that is no pose.
-const INVALID: i8 = i8::MIN;

@@ -187,7 +187,7 @@ class Questions(unittest.TestCase):
         for call in (scan.collide_each, scan.distance_each):
             with self.assertRaisesRegex(ValueError, "pose 6: expected a rotation"):
                 call(scan, many)
-        with self.assertRaisesRegex(ValueError, "as many poses of both scans.*got 3 and 10"):
+        with self.assertRaisesRegex(ValueError, "as many poses of both.*got 3 and 10"):
             scan.collide_each(scan, many, many[:3])
         with self.assertRaisesRegex(ValueError, "as many rotations as translations, got 2 and 3"):
             nearmiss.pose(np.zeros((2, 3, 3)), np.zeros((3, 3)))

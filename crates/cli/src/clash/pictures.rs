@@ -8,7 +8,7 @@ use nearmiss_draw::picture::Picture;
 use crate::clash::list::List;
 use crate::console::Bar;
 use crate::picture::{
-    GROUND, HALO, LARGEST, OF_A, OF_B, PANEL_GROUND, directions, dot, obstacle, scale_bar, splat,
+    GROUND, HALO, LARGEST, OF_A, OF_B, PANEL_GROUND, directions, dot, obstacle, paint_sized, scale_bar, splat,
     stored_index,
 };
 use crate::viewpoint::whole_camera;
@@ -29,6 +29,9 @@ const CONTACT: f64 = 4.5;
 /// smaller scan.
 const RADII: f64 = 12.0;
 const OF_SMALLER: f64 = 0.12;
+
+/// The half height of the close view up to which a small scan is shown as a whole, in its diagonals.
+const OF_SMALL: f64 = 0.75;
 
 /// A scan is cut open in the overview if the diagonal of its box exceeds this multiple of the
 /// other's.
@@ -265,8 +268,10 @@ impl Close {
         };
         let sizes = list.views.map(|view| diagonal(&bounds(view)));
         let smaller = usize::from(sizes[1] < sizes[0]);
+        // A scan that is small compared with the spacing of the other fills the view.
+        let around = (RADII * radius(0).min(radius(1))).max(OF_SMALL * sizes[smaller]);
         let reach: f64 = (0.7_f64 * clash.group.diagonal())
-            .max(RADII * radius(0).max(radius(1)))
+            .max((RADII * radius(0).max(radius(1))).min(around))
             .max(OF_SMALLER * sizes[smaller])
             .max(1.5 * clash.upper)
             .max(f64::MIN_POSITIVE);
@@ -308,11 +313,13 @@ impl Close {
         let [width, height] = CLOSE;
         let mut canvas = Canvas::new(width, height, GROUND);
         canvas.fill(self.camera.area, PANEL_GROUND);
-        for ((view, shown), colour) in list.views.into_iter().zip(&self.shown).zip([OF_A, OF_B]) {
-            for &i in shown {
-                point(list, &mut canvas, &self.camera, (view, i), colour, f64::INFINITY);
+        let sizes = list.views.map(|view| diagonal(&bounds(view)));
+        paint_sized(&mut canvas, self.camera.area, sizes, |canvas, side| {
+            for &i in &self.shown[side] {
+                let (of, colour) = ((list.views[side], i), [OF_A, OF_B][side]);
+                point(list, canvas, &self.camera, of, colour, f64::INFINITY);
             }
-        }
+        });
         scale_bar(&mut canvas, &self.camera);
         for &contact in &self.contacts {
             contact_dot(&mut canvas, &self.camera, contact, colour_of(clash));

@@ -120,6 +120,8 @@ pub(crate) fn collide<'a>(
             // Before the first comparison nothing is known.
             let is_compared = search.pair.meter.spent.node_pairs > 0;
             let likelihood = if is_compared { likelihood(open) } else { 0.5 };
+            // Enough pairs are likely to collide, which the open pairs alone may not show.
+            let likelihood = if search.count >= search.enough { likelihood.max(0.5) } else { likelihood };
             let best = open.first().map_or(NodePair::ROOTS, |open| open.pair);
             (MeshVerdict::Undecided(region(&search.pair, best)), likelihood)
         }

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, SupportsFloat, TypeAlias, TypedDict
+from typing import Any, Literal, SupportsFloat, TypeAlias, TypedDict, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,6 +43,14 @@ class _CollideOptions(_ShapeOptions, total=False):
 class _SweepOptions(_MeaningOptions, total=False):
     work: int | None
     seconds: float | None
+
+class _BudgetOptions(TypedDict, total=False):
+    work: int | None
+    seconds: float | None
+
+class _MeshOptions(_BudgetOptions, total=False):
+    p_min: float
+    k_min: int
 
 class _DistanceOptions(_SweepOptions, total=False):
     relative: float
@@ -258,7 +266,79 @@ class Scan:
         hint: Hint | None = None,
         **options: Unpack[_CollideOptions],
     ) -> _Records: ...
+    def clashes(
+        self,
+        other: Scan,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        clearance: SupportsFloat = 0.0,
+        link: SupportsFloat | None = None,
+        **options: Unpack[_MeaningOptions],
+    ) -> _Records: ...
+    def curves(
+        self,
+        other: Scan,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        spacing: SupportsFloat | None = None,
+        tolerance: SupportsFloat | None = None,
+    ) -> list[NDArray[np.float64]]: ...
     def target(self, pose: _Pose = None, **options: Unpack[_ShapeOptions]) -> Target: ...
+
+class Mesh:
+    def __new__(cls, vertices: ArrayLike, triangles: ArrayLike, *, weld: SupportsFloat = 0.0) -> Mesh: ...
+    @staticmethod
+    def read(path: _Path, *, format: str | None = None, weld: SupportsFloat = 0.0) -> Mesh: ...
+    @staticmethod
+    def open(path: _Path, *, check: _Check = "full") -> Mesh: ...
+    @staticmethod
+    def from_bytes(data: bytes, *, check: _Check = "full") -> Mesh: ...
+    def to_bytes(self) -> bytes: ...
+    def save(self, path: _Path) -> int: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+    def __len__(self) -> int: ...
+    @property
+    def bounds(self) -> NDArray[np.float64]: ...
+    @property
+    def is_closed(self) -> bool: ...
+    @overload
+    def collide(
+        self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_MeshOptions]
+    ) -> Answer: ...
+    @overload
+    def collide(
+        self, other: Scan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_CollideOptions]
+    ) -> Answer: ...
+    @overload
+    def collide_each(
+        self, other: Mesh, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_MeshOptions]
+    ) -> _Records: ...
+    @overload
+    def collide_each(
+        self, other: Scan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_CollideOptions]
+    ) -> _Records: ...
+    @overload
+    def distance(
+        self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_BudgetOptions]
+    ) -> Distance: ...
+    @overload
+    def distance(
+        self, other: Scan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_DistanceOptions]
+    ) -> Distance: ...
+    @overload
+    def distance_each(
+        self, other: Mesh, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_BudgetOptions]
+    ) -> _Records: ...
+    @overload
+    def distance_each(
+        self, other: Scan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_DistanceOptions]
+    ) -> _Records: ...
+    def contacts(self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None) -> _Records: ...
+    def penetration(
+        self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_BudgetOptions]
+    ) -> tuple[float, float, _Triple]: ...
 
 class Shape:
     @staticmethod

@@ -1,0 +1,122 @@
+"""Meshes, alone and against scans; clashes and curves of scans."""
+
+import pickle
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import nearmiss
+from scenes import DRAGON, dragon, plate, poses
+
+
+def cube(half=0.5):
+    """Vertices and triangles of a closed cube about the origin."""
+    corners = np.array([[x, y, z] for x in (-half, half) for y in (-half, half) for z in (-half, half)])
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
+
+
+def at(x, y=0.0, z=0.0):
+    return nearmiss.pose(translation=[x, y, z])
+
+
+class Meshes(unittest.TestCase):
+    def test_two_cubes_are_compared_exactly(self):
+        mesh = nearmiss.Mesh(*cube())
+        self.assertEqual((len(mesh), mesh.is_closed), (12, True))
+        np.testing.assert_array_equal(mesh.bounds, [[-0.5] * 3, [0.5] * 3])
+        for x, touches, distance in [(0.75, True, 0.0), (1.0, True, 0.0), (1.25, False, 0.25), (3.0, False, 2.0)]:
+            answer, apart = mesh.collide(mesh, at(x)), mesh.distance(mesh, at(x))
+            self.assertEqual(answer.touches, touches, x)
+            self.assertEqual(answer.evidence, "certified", x)
+            self.assertAlmostEqual(apart.upper, distance, delta=1e-9, msg=str(x))
+            self.assertEqual(apart.lower, apart.upper, x)
+        lower, upper, direction = mesh.penetration(mesh, at(0.75))
+        self.assertTrue(0.1 < lower <= 0.25 <= upper < 0.26, (lower, upper))
+        self.assertGreater(direction[0], 0.99)
+        contacts = mesh.contacts(mesh, at(0.75, 0.1, 0.2))
+        self.assertEqual(contacts["ends"].shape[1:], (2, 3))
+        self.assertLess(np.abs(contacts["point"] - contacts["ends"].mean(axis=1)).max(), 1e-9)
+
+    def test_batches_agree_with_single_answers(self):
+        mesh, where = nearmiss.Mesh.read(DRAGON), poses(3, 200, 0.1)
+        answers, distances = mesh.collide_each(mesh, where), mesh.distance_each(mesh, where)
+        self.assertGreater((answers["verdict"] == 1).sum(), 10)
+        self.assertGreater((answers["verdict"] == 0).sum(), 10)
+        for i in range(200):
+            self.assertEqual(mesh.collide(mesh, where[i]).touches, bool(answers["verdict"][i]), i)
+            self.assertEqual(mesh.distance(mesh, where[i]).upper, distances["upper"][i], i)
+        np.testing.assert_array_equal(distances["upper"] == 0.0, answers["verdict"] == 1)
+        likely = mesh.collide_each(mesh, where, p_min=0.9, k_min=1)
+        missed = (likely["likelihood"] < 0.5) & (answers["verdict"] == 1)
+        self.assertFalse(missed.any(), "no contact is missed")
+
+    def test_a_mesh_meets_a_scan_of_the_same_thing(self):
+        mesh, scan = nearmiss.Mesh.read(DRAGON), dragon()
+        self.assertTrue(mesh.collide(scan, at(0.09, 0.03, 0.01)).touches)
+        apart = mesh.distance(scan, at(0.3))
+        self.assertTrue(0.0 < apart.lower <= apart.upper, apart)
+        other = scan.distance(scan, at(0.3))
+        self.assertLess(abs(apart.upper - other.upper), scan.sampling_radius)
+        self.assertFalse(mesh.collide(scan, at(0.3), margin=0.9 * apart.lower).touches)
+        self.assertTrue(mesh.collide(scan, at(0.3), margin=1.1 * apart.upper).touches)
+        verdicts = mesh.collide_each(scan, poses(5, 50, 0.1))["verdict"]
+        self.assertEqual(set(verdicts.tolist()), {0, 1})
+
+    def test_files_and_pickles_hold_the_same_mesh(self):
+        mesh = nearmiss.Mesh.read(DRAGON)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "dragon.nm"
+            mesh.save(path)
+            for again in (nearmiss.Mesh.open(path), pickle.loads(pickle.dumps(mesh))):
+                self.assertEqual(again.to_bytes(), mesh.to_bytes())
+            with self.assertRaises(ValueError):
+                nearmiss.Scan.open(path)
+
+    def test_what_is_wrong_raises_a_value_error(self):
+        vertices, triangles = cube()
+        mesh = nearmiss.Mesh(vertices, triangles)
+        for words, call in {
+            r"index below 8|below 8": lambda: nearmiss.Mesh(vertices, triangles + 5),
+            r"shape \(N, 3\), got \(12, 2\)": lambda: nearmiss.Mesh(vertices, triangles[:, :2]),
+            r"no integers": lambda: nearmiss.Mesh(vertices, triangles * 1.0),
+            r"indices from 0": lambda: nearmiss.Mesh(vertices, triangles - 1),
+            r"positive area": lambda: nearmiss.Mesh(vertices, triangles[:, [0, 0, 0]]),
+            r"p_min from 0 to 1": lambda: mesh.collide(mesh, p_min=2.0),
+        }.items():
+            with self.subTest(words), self.assertRaisesRegex(ValueError, words):
+                call()
+        with self.assertRaisesRegex(TypeError, "options among p_min"):
+            mesh.collide(mesh, margin=0.1)
+        with self.assertRaises(TypeError):
+            mesh.collide("mesh")
+
+
+class Clashes(unittest.TestCase):
+    def test_crossing_plates_clash_along_a_line(self):
+        scan = nearmiss.Scan(plate())
+        upright = np.array([[1, 0, 0, 0.005], [0, 0, -1, 0.505], [0, 1, 0, -0.505], [0, 0, 0, 1.0]])
+        (clash,) = scan.clashes(scan, upright)
+        self.assertTrue(clash["hard"])
+        self.assertEqual(clash["upper"], 0.0)
+        self.assertGreater(clash["size"][0], 0.7)
+        (curve,) = scan.curves(scan, upright)
+        self.assertEqual(curve.shape[1], 3)
+        self.assertLess(np.abs(curve[:, 1:] - [0.505, 0.0]).max(), 1e-3)
+        self.assertGreater(np.ptp(curve[:, 0]), 0.9)
+
+    def test_near_places_are_listed_with_their_distance(self):
+        scan = nearmiss.Scan(plate())
+        self.assertEqual(len(scan.clashes(scan, at(0, 0, 0.2))), 0)
+        (clash,) = scan.clashes(scan, at(0, 0, 0.2), clearance=0.25)
+        self.assertFalse(clash["hard"])
+        self.assertTrue(clash["lower"] <= 0.2 + 1e-6 and 0.2 - 1e-6 <= clash["upper"] < 0.22, clash)
+        self.assertEqual(scan.curves(scan, at(0, 0, 0.2)), [])
+        with self.assertRaisesRegex(ValueError, "link"):
+            scan.clashes(scan, link=-1.0)
+
+
+if __name__ == "__main__":
+    unittest.main()
