@@ -7,6 +7,7 @@ pub mod counting;
 pub mod figures;
 pub mod guard;
 pub mod hulls;
+pub mod in_scan;
 pub mod klein2004;
 pub mod machine;
 pub mod object;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nearmiss::{Aabb, PointCloud, TriangleMesh};
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
+use nearmiss_testdata::{house, scanner};
 
 use crate::Failure;
 use crate::scorer::radius;
@@ -25,8 +26,9 @@ pub struct Object {
 }
 
 impl Object {
-    /// Reads `source`: the path of a file, `dragon-5k` or `dragon-23k` (shipped with the tests), or
-    /// `bumpy:POINTS` (a generated surface).
+    /// Reads `source`: the path of a file, `dragon-5k` or `dragon-23k` (shipped with the tests), or a
+    /// generated one: `bumpy:POINTS` (a surface), `hall` (a frame of a spinning laser scanner, with rings
+    /// on the floor) or `house` (a building of two storeys, with noise).
     ///
     /// # Errors
     /// When the object cannot be read or generated.
@@ -36,8 +38,13 @@ impl Object {
             "dragon-23k" => Some(dragon_path(Dragon::Points23k)),
             _ => None,
         };
-        if let Some(count) = source.strip_prefix("bumpy:") {
-            let cloud = PointCloud::from_positions(&bumpy_sphere(count.parse()?))?;
+        let generated = match source {
+            "hall" => Some(scanner::frame(&scanner::Frame { beams: 32, steps: 1800, noise: 0.01, seed: 1 })),
+            "house" => Some(house::scanned(&house::house(), 0.05, 0.005, 1)),
+            _ => source.strip_prefix("bumpy:").map(|count| count.parse().map(bumpy_sphere)).transpose()?,
+        };
+        if let Some(points) = generated {
+            let cloud = PointCloud::from_positions(&points)?;
             return Ok(Self { name: source.into(), r: radius(&cloud)?, cloud, mesh: None });
         }
         let path = shipped.as_deref().unwrap_or_else(|| Path::new(source));

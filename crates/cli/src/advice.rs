@@ -152,7 +152,7 @@ fn of_noise(scan: &Scan) -> Option<String> {
     (share > MANY_NOISY).then(|| {
         let wider = if has_local_bandwidth(scan.plan().options().bandwidth) {
             let h = f64::from(scan.plan().bandwidth(median(scan.radii()))) * scan.frame().scale;
-            format!("use `preprocess --bandwidth {}` to average over noise", short_up(2.0 * h))
+            format!("if that is noise, use `preprocess --bandwidth {}` to average over it", short_up(2.0 * h))
         } else {
             format!("use `collide {}` to compare balls instead of surfaces", thickened(scan.sampling_radius()))
         };

@@ -154,9 +154,9 @@ fn open(args: &ConvertArgs) -> Result<Source, CliError> {
         Pieces::Mesh { vertices, mesh } => (vertices, mesh),
     };
     console::warn(format_args!(
-        "{}: the output holds the {} of this mesh, but no points on its {}; use `sample` for points on the faces",
+        "{}: the output comes of the {} of this mesh, without points on its {}; use `sample` for points on the faces",
         args.input.display(),
-        grouped_count(mesh.vertices().len() as u64, "point"),
+        grouped_count(mesh.vertices().len() as u64, "corner"),
         grouped_count(mesh.triangles().len() as u64, "triangle"),
     ));
     Ok(Source::Vertices(vertices))

@@ -295,7 +295,7 @@ fn sentence(found: &Distance, unit: f64, options: &DistanceOptions) -> String {
     match semantics {
         Semantics::Thickened(_) => format!("They are {bracket}.{unfinished}"),
         _ => format!(
-            "They are {bracket} ({}), accurate to the local spacing of {}.{}{unfinished}",
+            "They are {bracket} ({}); the scans themselves are known to their local spacing of {}.{}{unfinished}",
             word(found.evidence),
             rough(found.band),
             limited(found, options).unwrap_or_default()

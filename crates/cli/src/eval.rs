@@ -62,7 +62,6 @@ struct Report {
 }
 
 pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
-    input::check_there(&args.points)?;
     if input::is_prepared(&args.points) {
         let what = "expected text with a line x y z for each point, got a prepared scan (by its content or name); \
                     check that the two files are not swapped";

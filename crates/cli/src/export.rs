@@ -39,7 +39,7 @@ pub struct ExportArgs {
     /// Boxes of the nodes, as lines, as OBJ
     #[arg(long, value_name = "B.obj")]
     pub boxes: Option<PathBuf>,
-    /// Sampling radius and bandwidth of each point: i,r,h
+    /// Local radius and bandwidth of each point: i,r,h
     #[arg(long, value_name = "R.csv")]
     pub radii: Option<PathBuf>,
     /// Edges of the graph: i,j,length,virtual, with i < j
@@ -57,7 +57,7 @@ pub struct ExportArgs {
     /// From where the picture is taken
     #[command(flatten)]
     pub view: ViewArgs,
-    /// Depth of the nodes to export; the root has depth 0; leaves above it are included
+    /// Depth of the nodes to export; the root has depth 0; leaves at lesser depths are included
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
     /// Check prepared scans in full before use: checksums, and every number

@@ -244,7 +244,7 @@ pub enum Command {
     /// Follow a mesh or scan that deforms from frame to frame, and test it at every query time
     #[command(after_long_help = ANIMATE_EXAMPLES)]
     Animate(AnimateArgs),
-    /// Find how many random points an error rate needs, for `collide --method interpolation --flat`
+    /// Find how many random points keep the errors below a rate, for `collide --method interpolation --flat`
     #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
     Density(DensityArgs),
     /// Generate test poses for `collide`: a sweep, or poses near contact

@@ -10,10 +10,10 @@ use clap::Args;
 pub struct MemoryArgs {
     /// Memory limit, such as 500MB or 16GB
     ///
-    /// By default, the limit is the memory that the system has left, and 4 GiB for `slices build`.
-    /// A command that needs more is refused before it starts. With this option, two commands work
-    /// on disk instead, beside the output: `slices build`, and `preprocess` of points without a
-    /// graph and without filters other than --crop and --class.
+    /// The default is the memory that the system has left; for `slices build` 4 GiB. A command that
+    /// needs more is refused before it starts. Within this limit, `slices build` works on disk,
+    /// beside the output. So does `preprocess` of points without a graph and without filters other
+    /// than --crop and --class.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub memory: Option<u64>,
 }

@@ -22,7 +22,7 @@ pub struct PathArgs {
     /// line of output, in order; a summary follows.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Write a table: with --poses a row for each pose, with --all a row for each contact
+    /// Write a table with a row for each pose of --poses, or for each contact of `collide --all`
     ///
     /// A row for a pose has its line, time, verdict, evidence, clearance and place, among others.
     #[arg(long, value_name = "OUT.csv", help_heading = "Output")]

@@ -36,7 +36,7 @@ pub struct PosesArgs {
     /// Rotations and directions are random.
     #[arg(long)]
     pub sweep: bool,
-    /// Make poses shifted by up to 10 r from first contact, half of them apart
+    /// Make poses shifted by up to 10 r from first contact, half of them without overlap
     ///
     /// r is the larger sampling radius. Two scans are in contact here when two of their points are r/2 apart;
     /// where that happens is found by bisection, not by `collide`.
@@ -48,7 +48,7 @@ pub struct PosesArgs {
     #[arg(long)]
     pub normalise: bool,
     /// Number of poses at each distance (--sweep) or in all (--near)
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, alias = "count", value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -80,7 +80,7 @@ pub enum MethodName {
 pub enum BracketsName {
     /// The nearest drawn point on the other side
     Drawn,
-    /// The map of close pairs of a, which `preprocess --close-pairs` adds, as far as it reaches
+    /// The nearest point in the close-pairs map of a, which `preprocess --close-pairs` adds
     /// (Klein & Zachmann 2005, section 4.3)
     Annulus,
 }

@@ -12,7 +12,7 @@ use nearmiss::{
     SweepAnswer, SweepOptions, SweepPlan, SweepVerdict,
 };
 
-use crate::as_mesh::AsMeshName;
+use crate::as_mesh::{AsMeshName, one_of_two};
 use crate::bodies::{Bodies, swap};
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
@@ -51,11 +51,11 @@ pub struct SweepArgs {
     #[command(flatten)]
     pub meaning: MeaningArgs,
     /// Compare the triangles of this input, a or b, instead of its points
-    #[arg(long, value_enum, value_name = "WHICH")]
+    #[arg(long, value_name = "WHICH", value_parser = one_of_two())]
     pub as_mesh: Option<AsMeshName>,
     /// Time limit for the whole motion, such as 50ms
     ///
-    /// The unit is ns, us, ms or s. What is proven by then is told.
+    /// The unit is ns, us, ms or s. The answer states what is proven by then.
     #[arg(long, value_name = "50ms", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
     pub budget: Option<Duration>,
     /// Work limit for the whole motion; reproducible, unlike time
@@ -83,11 +83,6 @@ pub struct SweepArgs {
 pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
     if let Some(which) = args.as_mesh {
         which.refuse(&[("--image", args.image.is_some())])?;
-        if which == AsMeshName::Both {
-            let what = "--as-mesh both: expected at least one scan, got two meshes; put points on one of them with \
-                        `nearmiss sample`";
-            return Err(CliError::Usage(what.into()));
-        }
     }
     let console = Console::new(args.quiet);
     let inputs = args.pair.inputs();

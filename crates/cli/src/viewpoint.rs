@@ -14,8 +14,8 @@ use nearmiss_draw::canvas::{Area, Camera};
 pub struct ViewArgs {
     /// Axis that points up in the picture: x, y, z, -x, -y or -z
     ///
-    /// The default is z if the scan, or the larger of two, has level floors and is wider than high
-    /// along z, as rooms, buildings and streets are. Otherwise the longest extent is drawn level.
+    /// The default is z for rooms, buildings and streets, which have level floors and are wider than
+    /// high. Other scans are drawn with their longest side level.
     #[arg(
         long,
         value_name = "AXIS",
@@ -27,8 +27,8 @@ pub struct ViewArgs {
     /// Direction from which the picture is taken, in degrees
     ///
     /// With this option, the default of --up is z. The azimuth is counted anticlockwise as seen
-    /// from above. The viewer is at +x for azimuth 0 and at +y for 90; with --up y at +z and +x;
-    /// with --up x at +y and +z. Elevation 0 is a view from the side, 90 from above.
+    /// from above. Azimuths 0 and 90 look from +x and +y; with --up y from +z and +x; with
+    /// --up x from +y and +z. Elevation 0 is a view from the side, 90 from above.
     #[arg(
         long,
         value_name = "AZIMUTH,ELEVATION",

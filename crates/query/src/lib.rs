@@ -33,6 +33,7 @@ pub use distance::{Distance, DistanceOptions, DistancePlan};
 pub use leaf::crossing::{Disc, crossing};
 pub use many::batch::{BatchScratch, Until, each};
 pub use many::body::{Body, BodyPair, PlacedBody};
+pub use many::nearest::NearestPair;
 pub use many::world::{Bodies, BodyId, World};
 pub use mesh::answer::{ContactRegion, MeshAnswer, MeshContact, MeshVerdict};
 pub use mesh::distance::MeshDistance;

@@ -2,4 +2,5 @@
 
 pub(crate) mod batch;
 pub(crate) mod body;
+pub(crate) mod nearest;
 pub(crate) mod world;

@@ -2,31 +2,22 @@
 //! a façade.
 //!
 //! The object is placed at random within the scan's bounds; by default it is 1/25 of the scan's
-//! diagonal long. The truth is the exact distance of the nearest two points. Lengths are given in
-//! *local spacings*. The local spacing is the greater of the distances from either of these two
-//! points to its sixth distinct neighbour in its own scan, times the scale of the pose. Each pose
-//! is queried once for a certified verdict and once for the distance, in separate passes.
+//! diagonal long. The truth is the exact distance of the nearest two points, and lengths are given in
+//! local spacings ([`nearmiss_benches::in_scan`]). Each pose is queried once for a certified verdict
+//! and once for the distance, in separate passes.
 
 use std::hint::black_box;
 
 use nearmiss::{
-    BuildOptions, CollideOptions, CollidePlan, Detail, Distance, DistanceOptions, DistancePlan, Evidence,
-    Pair, PairHint, PointCloud, Pose, Scan, Scratch, Verdict,
+    BuildOptions, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Pair, PairHint, Pose,
+    Scan, Scratch,
 };
 use nearmiss_benches::clock::{nanoseconds, timed};
+use nearmiss_benches::in_scan::{FAR, Score, Truth, truths};
 use nearmiss_benches::object::Object;
-use nearmiss_benches::rivals::kiddo::PointScan;
 use nearmiss_benches::sample::{Sample, count};
-use nearmiss_benches::scorer::spacings;
 use nearmiss_benches::{Failure, machine};
-use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
-use rand::RngExt;
-
-/// Separations of at least this many local spacings should be certified.
-const FAR: f64 = 6.0;
-
-/// The object's longest side over the scan's diagonal.
-const SHARE: f64 = 0.04;
+use nearmiss_testdata::arbitrary::{rng, unit_vector};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
@@ -70,39 +61,13 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     options.scans.iter().try_for_each(|scan| measure(scan, options))
 }
 
-/// The truth about a pose, by brute force.
-struct Truth {
-    pose: Pose,
-    /// Distance of the nearest two points.
-    distance: f64,
-    /// The local spacing at these points.
-    spacing: f64,
-}
-
-#[derive(Default)]
-struct Score {
-    far: usize,
-    certified: usize,
-    at_least_half: usize,
-    lower_above: usize,
-    upper_above: usize,
-    contacts: usize,
-    furthest_contact: f64,
-}
-
 fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     let object = Object::read(source)?;
     let body = Object::read(&options.object)?;
-    let half = object.cloud.bounds().half_extents();
-    let diagonal = 2.0 * half.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let size = options.size.unwrap_or(SHARE * diagonal);
-    let longest = 2.0 * body.cloud.bounds().half_extents().into_iter().fold(0.0, f64::max);
-    let scale = size / longest;
-
     let build = BuildOptions::default();
     let build = options.reach.map_or(build, |reach| build.with_reach(reach));
     let (a, b) = (Scan::build(&object.cloud, &build)?, Scan::build(&body.cloud, &BuildOptions::default())?);
-    let truths = truths(&object.cloud, &body.cloud, scale, options)?;
+    let truths = truths(&object.cloud, &body.cloud, options.size, (options.poses, options.seed))?;
 
     let mut score = Score::default();
     let far = verdicts([&a, &b], &truths, options, &mut score)?;
@@ -116,11 +81,8 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
         distances.push(nanoseconds(time));
         // A planner queries nearly the same pose again, so its data is in the cache.
         again.push((0..2).map(|_| nanoseconds(ask().1)).fold(f64::INFINITY, f64::min));
-        count_distance(&found, truth, &mut score);
-        if options.listed && truth.distance >= FAR * truth.spacing && found.lower < 0.5 * truth.distance {
-            let Distance { lower, upper, .. } = found;
-            println!("pose {i}: {lower} to {upper}, truth {}", truth.distance);
-        }
+        let fault = score.distance(truth, &found).filter(|_| options.listed);
+        fault.iter().for_each(|fault| println!("pose {i}: {fault}"));
     }
     let hinted = hinted_step(&a, &b, &truths, options)?;
 
@@ -163,66 +125,13 @@ fn verdicts(
     for (i, truth) in truths.iter().enumerate() {
         let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&truth.pose));
         let (answer, time) = timed(|| black_box(Pair::new(va, *black_box(&vb)).collide(&plan, &mut scratch)));
-        let is_far = truth.distance >= FAR * truth.spacing;
-        match answer.verdict {
-            Verdict::Separated { evidence, gap } => {
-                if gap > truth.distance {
-                    println!("pose {i}: a gap of {gap}, but points {} apart", truth.distance);
-                }
-                let is_certified = evidence == Evidence::Certified;
-                score.certified += usize::from(is_far && is_certified);
-                if options.listed && is_far && !is_certified {
-                    println!("pose {i}: {:.1} spacings apart, not certified", truth.distance / truth.spacing);
-                }
-            }
-            Verdict::Intersecting { .. } => {
-                score.contacts += 1;
-                let off = truth.distance / truth.spacing;
-                score.furthest_contact = score.furthest_contact.max(off);
-                if options.listed && off > 1.0 {
-                    println!("pose {i}: a contact {off:.2} spacings from the nearest points");
-                }
-            }
-            Verdict::Undecided(reason) => println!("pose {i}: {reason:?}"),
-        }
-        if is_far {
-            score.far += 1;
+        let fault = score.verdict(truth, &answer).filter(|_| options.listed);
+        fault.iter().for_each(|fault| println!("pose {i}: {fault}"));
+        if truth.is_far() {
             far.push(nanoseconds(time));
         }
     }
     Ok(far)
-}
-
-fn count_distance(found: &Distance, truth: &Truth, score: &mut Score) {
-    let is_far = truth.distance >= FAR * truth.spacing;
-    // Both sides round the same positions to single precision once.
-    let rounding = 1e-6 * truth.distance + 1e-6 * truth.spacing;
-    score.at_least_half += usize::from(is_far && found.lower >= 0.5 * truth.distance);
-    score.lower_above += usize::from(found.lower > truth.distance + rounding);
-    score.upper_above += usize::from(found.upper > truth.distance + rounding);
-}
-
-/// Random poses of the object with the exact distances of the points.
-fn truths(
-    scan: &PointCloud,
-    body: &PointCloud,
-    scale: f64,
-    options: &Options,
-) -> Result<Vec<Truth>, Failure> {
-    let (spacings_a, spacings_b) = (spacings(scan)?, spacings(body)?);
-    let tree = PointScan::new(scan, f64::INFINITY)?;
-    let centre = body.bounds().centre();
-    let (bounds, rng) = (scan.bounds(), &mut rng(options.seed));
-    let truths = (0..options.poses).map(|_| {
-        let to =
-            [0, 1, 2].map(|k| bounds.min[k] + (bounds.max[k] - bounds.min[k]) * rng.random_range(0.0..1.0));
-        let turned = rotation(rng).with_scale(scale);
-        let from = turned.apply(centre);
-        let pose = turned.with_translation([0, 1, 2].map(|k| to[k] - from[k]));
-        let (distance, i, j) = tree.nearest_pair(body, &pose);
-        Truth { pose, distance, spacing: spacings_a[i].max(spacings_b[j] * scale) }
-    });
-    Ok(truths.collect())
 }
 
 /// The mean time of a hinted query while the object moves in steps of `--step` from the clear
@@ -232,7 +141,7 @@ fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Resul
     let plan = CollidePlan::new(&asked, a, b)?;
     let (mut scratch, mut all) = (Scratch::default(), Sample::default());
     let rng = &mut rng(options.seed ^ 1);
-    for truth in truths.iter().filter(|truth| truth.distance >= FAR * truth.spacing).take(50) {
+    for truth in truths.iter().filter(|truth| truth.is_far()).take(50) {
         let way = unit_vector(rng);
         let (mut hint, mut pose) = (PairHint::default(), truth.pose);
         let from: [f64; 3] = pose.translation();

@@ -9,6 +9,7 @@ mod analytic;
 mod answers;
 mod calibration;
 mod counts;
+mod scans;
 mod truth;
 
 use std::process::ExitCode;
@@ -18,8 +19,8 @@ use nearmiss_benches::{Failure, guard};
 
 /// Checks of the answers of nearmiss, and of their cost.
 ///
-/// An object is a file, or `dragon-5k`, `dragon-23k` (shipped with the tests), or `bumpy:POINTS`
-/// (generated).
+/// An object is a file, or `dragon-5k`, `dragon-23k` (shipped with the tests), or one of these
+/// generated ones: `bumpy:POINTS`, `hall` (a frame of a laser scanner), `house` (a scanned building).
 #[derive(Debug, Parser)]
 #[command(arg_required_else_help = true, args_conflicts_with_subcommands = true)]
 struct Arguments {
@@ -42,17 +43,20 @@ enum Command {
     Calibration(calibration::Arguments),
     /// Counts of instructions, by valgrind, against those on record
     Counts(counts::Arguments),
+    /// Evidence and bounds of an object at random poses in scans of rooms
+    Scans(scans::Arguments),
     /// Verdicts, against exact answers in a file
     Truth(truth::Arguments),
 }
 
 /// The arguments of the checks that `--quick` runs.
-const QUICK: [&[&str]; 5] = [
+const QUICK: [&[&str]; 6] = [
     &["answers"],
     &["counts"],
     &["analytic"],
     &["analytic", "--certified"],
     &["agreement", "dragon-5k", "--poses", "300"],
+    &["scans", "hall", "house"],
 ];
 
 fn main() -> Result<ExitCode, Failure> {
@@ -71,6 +75,7 @@ fn run(command: &Command) -> Result<bool, Failure> {
         Command::Answers(arguments) => answers::run(arguments),
         Command::Calibration(arguments) => calibration::run(arguments),
         Command::Counts(arguments) => counts::run(arguments),
+        Command::Scans(arguments) => scans::run(arguments),
         Command::Truth(arguments) => truth::run(arguments),
     }
 }

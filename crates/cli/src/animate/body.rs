@@ -23,14 +23,14 @@ use crate::picture::splat;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[non_exhaustive]
 pub enum AnimateMethod {
-    /// Refit, and prepare anew once that has made the bounds too loose; kinetic for two meshes asked so often
-    /// that it takes less
+    /// Refit, and prepare anew when the bounds are too loose; kinetic for two meshes with many query times a
+    /// file, if that is faster
     Auto,
     /// Refit the bounds; the order of triangles or points stays
     Refit,
     /// Prepare every frame anew
     Rebuild,
-    /// Work only when the points that determine a box change (Zachmann & Weller 2006); two meshes
+    /// Update a box only when other points come to determine it (Zachmann & Weller 2006); two meshes
     Kinetic,
 }
 

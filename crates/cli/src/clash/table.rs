@@ -95,7 +95,7 @@ pub(crate) fn lines(list: &List<'_>, most: usize) -> Vec<String> {
     if list.found.clashes.is_empty() {
         return Vec::new();
     }
-    let head = ["clash", "kind", "centre", "size", "distance", "contacts"].map(str::to_owned);
+    let head = ["clash", "kind", "centre", "size", "distance", "places"].map(str::to_owned);
     let rows: Vec<[String; 6]> =
         std::iter::once(head).chain(list.reports().take(most).map(|clash| cells(list, &clash))).collect();
     let widths: [usize; 6] =

@@ -34,7 +34,7 @@ pub struct MeshCollideArgs {
     /// Also tell how far and in which direction to move b out of a
     ///
     /// Closed parts count as solid, other parts as surfaces. The length lies between two bounds,
-    /// which hold whenever --budget or --work ends the search.
+    /// which hold even if --budget or --work ends the search.
     #[arg(long)]
     pub penetration: bool,
     /// Time limit for each query, such as 200us
@@ -50,7 +50,8 @@ pub struct MeshCollideArgs {
     /// Probability from which on a pair of nodes counts as colliding
     ///
     /// The search then visits the most probable pairs first, and stops once --k-min of them count.
-    /// A separation and a contact of triangles stay exact (Klein & Zachmann 2003).
+    /// `separated` and `intersecting` stay exact; other answers become `undecided` (Klein & Zachmann
+    /// 2003).
     #[arg(long, value_name = "P", value_parser = parse_probability, conflicts_with = "all", help_heading = "Budget and evidence")]
     pub p_min: Option<f64>,
     /// Number of such pairs at which the search stops [default: 3]

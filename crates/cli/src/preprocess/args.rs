@@ -34,7 +34,7 @@ pub struct PreprocessArgs {
     /// a mesh are prepared, as points.
     #[arg(long, conflicts_with_all = OF_SCANS)]
     pub as_mesh: bool,
-    /// Weld vertices over this distance, with --as-mesh; by default, only equal ones are welded
+    /// Weld vertices up to this far apart, with --as-mesh; by default, only equal ones are welded
     #[arg(long, value_name = "LEN", requires = "as_mesh", allow_hyphen_values = true, value_parser = parse_length)]
     pub weld: Option<f64>,
     /// The filters
@@ -47,13 +47,13 @@ pub struct PreprocessArgs {
     /// Largest gap to bridge between points, in the units of the input
     ///
     /// A wider gap counts as a hole. Balls about points have at most this diameter. The default is
-    /// twice the sampling radius, which is the 0.9-quantile of the local radii.
+    /// twice the sampling radius (the 0.9-quantile of the local radii).
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach, help_heading = "Surface")]
     pub reach: Option<f64>,
     /// Weight of a point by its distance
     #[arg(long, value_enum, default_value_t = WeightName::Gaussian, help_heading = "Research", hide_short_help = true)]
     pub weight: WeightName,
-    /// Bandwidth: local (follows the spacing), global (from the sampling radius), or a length
+    /// Width over which points are averaged: local (follows the spacing), global, or a length
     #[arg(long, value_name = "local|global|M", default_value = "local", allow_hyphen_values = true, value_parser = parse_bandwidth, help_heading = "Research", hide_short_help = true)]
     pub bandwidth: Bandwidth,
     /// Points in a leaf of the hierarchy, 4 to 64

@@ -82,14 +82,15 @@ pub(super) fn paint(
     let near = format!("{} apart", style.unit.length(highest / 3.0));
     let entries = [
         (Some(OF_A), style.names[0].as_str()),
-        (Some(CLEARANCE[0]), style.names[1].as_str()),
+        (None, style.names[1].as_str()),
         (None, "coloured by its distance from A:"),
         (Some(CLEARANCE[0]), "0"),
         (Some(CLEARANCE[1]), near.as_str()),
         (Some(CLEARANCE[3]), far.as_str()),
     ];
     legend::entries(&mut canvas, [left, top], width, &entries);
-    legend::sentence(&mut canvas, [left, top + legend::LINE], width, &told(answer));
+    let ring = nearest(&samples, key, answer).map_or(key, |sample| sample.time);
+    legend::sentence(&mut canvas, [left, top + legend::LINE], width, &told(answer, ring));
     canvas.picture()
 }
 
@@ -102,13 +103,13 @@ fn key_time(answer: &SweepAnswer) -> f64 {
     }
 }
 
-fn told(answer: &SweepAnswer) -> String {
+fn told(answer: &SweepAnswer, ring: f64) -> String {
     match answer.verdict {
-        SweepVerdict::Free { clearance, at, .. } => {
+        SweepVerdict::Free { clearance, .. } => {
             format!(
-                "Proven free: always more than {} apart. The ring marks b at t = {}.",
+                "Proven free: always more than {} apart. The ring marks b where it is nearest, at t = {}.",
                 short(clearance),
-                time(at)
+                time(ring)
             )
         }
         SweepVerdict::Impact { t_free, t_hit, .. } => {
@@ -118,6 +119,15 @@ fn told(answer: &SweepAnswer) -> String {
             format!("Proven free up to t = {}; undecided after it.", time(t_free))
         }
     }
+}
+
+/// Returns the sample that the picture marks: of a free motion the one with the least distance, otherwise
+/// the one at the time `key`.
+fn nearest<'s>(samples: &'s [Sample], key: f64, answer: &SweepAnswer) -> Option<&'s Sample> {
+    let off = |sample: &Sample| {
+        if answer.verdict.is_free() { sample.upper } else { (sample.time - key).abs() }
+    };
+    samples.iter().min_by(|p, q| off(p).total_cmp(&off(q)))
 }
 
 /// Measures the clearance at evenly spaced times.
@@ -163,10 +173,7 @@ fn view(
     (key, highest): (f64, f64),
     (answer, style): (&SweepAnswer, &Style),
 ) {
-    let Some(nearest) = samples.iter().min_by(|p, q| (p.time - key).abs().total_cmp(&(q.time - key).abs()))
-    else {
-        return;
-    };
+    let Some(nearest) = nearest(samples, key, answer) else { return };
     let scan = b.at(0.0).scan();
     let at_key = Placed::new(scan, &nearest.pose);
     // After an impact b is inside a.
@@ -376,7 +383,7 @@ fn plot(
         canvas.line(area, [[axes.x(hit), frame[2]], [axes.x(hit), strip + 8.0 * fine]], 3.0, HIT);
         label(canvas, area, [axes.x(hit) + 6.0 * fine, frame[2]], &format!("impact at t = {}", time(hit)));
     }
-    title(canvas, area, "Distance over t, between both lines; the thin one and the green strip are proven");
+    title(canvas, area, "Distance over t. Upper line: measured. Thin line and green strip: proven.");
 }
 
 /// Writes text beside a place: to the right of it for `share` 0, to the left for 1.

@@ -113,11 +113,14 @@ impl Report {
         match answer.verdict {
             SweepVerdict::Free { clearance, upper, at } => {
                 let kept = match clearance > 0.0 {
+                    // Rounding must not seem to fall short of what was asked.
+                    true if wanted > 0.0 && clearance < wanted + unit => format!("at least {}", short(wanted)),
                     true => format!("at least {}", rounded_down(clearance, unit)),
                     false => "more than 0".to_owned(),
                 };
+                let wanted = if wanted > 0.0 { format!(" with the clearance of {}", short(wanted)) } else { String::new() };
                 format!(
-                    "The whole motion is free (certified): the distance is always {kept}. The least measured is at \
+                    "The whole motion is free{wanted} (certified): the distance is always {kept}. The least measured is at \
                      most {}, at t = {}.",
                     short(upper),
                     short(at)
@@ -178,7 +181,7 @@ impl Report {
             ],
             self.micros,
         );
-        format!("t counts lines, the first is 0; {}; {cost}", queries.join(", "))
+        format!("t counts poses, the first is 0; {}; {cost}", queries.join(", "))
     }
 }
 

@@ -17,7 +17,8 @@ pub struct TouchArgs {
     /// `{"sphere":{"centre":[x,y,z],"radius":r}}`,
     /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}`, `{"box":{"pose":[16, 12 or 7
     /// numbers],"half":[x,y,z]}}`, `{"cylinder":{"pose":[…],"half_height":h,"radius":r}}` about the y
-    /// axis of its pose, `{"cone":{…}}` alike with its tip at the top,
+    /// axis of its pose, `{"cone":{…}}` with the same fields and its tip
+    /// at +y,
     /// `{"hull":{"points":[[x,y,z],…]}}`, `{"triangle":{"points":[…]}}` or
     /// `{"segment":{"points":[…]}}`. A `radius` also rounds boxes, hulls, triangles and segments;
     /// `rounding` rounds cylinders and cones. Each shape gets one line of output, in order.
@@ -26,10 +27,10 @@ pub struct TouchArgs {
     /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose: Option<String>,
-    /// Test the surface between the points, and report bounds of the distance and contacts
+    /// Test the surface between the points as well, and report bounds of the distance and contacts
     ///
-    /// The surface is the obstacle: tangent discs where points sample a sheet, balls of half the
-    /// local spacing about all other points. Normals of contacts point outwards if the scan is
+    /// Shapes are tested against the obstacle: tangent discs where points sample a sheet, small balls
+    /// about all other points. Normals of contacts point outwards if the scan is
     /// oriented (`preprocess --graph`), otherwise to the side of the shape's centre.
     #[arg(long)]
     pub surface: bool,

@@ -5,7 +5,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, Bodies, BodyId, CollideOptions, CollidePlan, Evidence, Pair, Placed, Reason, Scratch, Semantics,
+    Answer, Bodies, BodyId, Budget, CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Evidence, Pair, Placed, Reason, Scratch, Semantics,
     Shape, Verdict, World,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
@@ -397,4 +397,45 @@ fn each_pair_has_its_own_reach() {
     world.near_pairs_by(Bodies::All, 1.6, reach_of, &mut pairs);
     assert_eq!(pairs, expected, "the same pairs as one by one");
     assert!(pairs.len() > 10, "{} pairs", pairs.len());
+}
+
+#[test]
+fn the_nearest_pair_is_that_of_all_pairs() {
+    let plan = DistancePlan::new(&DistanceOptions::default(), &SCANS[0], &SCANS[1]).unwrap();
+    let (mut scratch, mut found) = (Scratch::default(), 0);
+    for seed in 0..60_u64 {
+        let mut world = World::new();
+        let placed: Bodied = (0..6)
+            .map(|k| {
+                let scan = usize::try_from((seed + k) % 4).unwrap();
+                let pose = if k == 5 { hostile_pose(seed) } else { proper_pose(scan, 3 * (7 * seed + k) + 1) };
+                (world.insert(&SCANS[scan], &pose), scan, pose)
+            })
+            .collect();
+        // Neighbours do not count, as along the arm of a robot.
+        let counts = |a: BodyId, b: BodyId| a.0.abs_diff(b.0) > 1;
+        let reach = if seed % 3 == 0 { 2.0 } else { f64::INFINITY };
+        let budget = &Budget::UNLIMITED;
+        let nearest = world.nearest_pair(Bodies::All, reach, counts, &plan, budget, &mut scratch);
+        let mut expected: Option<([BodyId; 2], f64, f64)> = None;
+        let view = |k: usize| Placed::new(&SCANS[placed[k].1], &placed[k].2);
+        for (i, j) in (0..6).flat_map(|i| (i + 2..6).map(move |j| (i, j))) {
+            let all = Pair::new(view(i), view(j)).distance(&plan, &mut scratch);
+            let is_near = all.upper < reach;
+            if all.upper.is_finite() && is_near && expected.is_none_or(|(_, upper, _)| all.upper < upper) {
+                expected = Some(([placed[i].0, placed[j].0], all.upper, all.lower));
+            }
+        }
+        let Some((ids, upper, lower)) = expected else {
+            assert!(nearest.is_none_or(|nearest| nearest.upper >= reach), "seed {seed}: {nearest:?}");
+            continue;
+        };
+        let nearest = nearest.expect("a pair is near");
+        assert_eq!((nearest.ids, nearest.upper), (ids, upper), "seed {seed}");
+        assert!(nearest.lower <= lower && nearest.lower >= 0.0, "seed {seed}: {nearest:?}");
+        let [p, q] = nearest.points.map(Vector3::from);
+        assert!((p - q).norm() <= upper * (1.0 + 1e-9) + 1e-9, "seed {seed}: {nearest:?}");
+        found += 1;
+    }
+    assert!(found > 40, "most worlds have a pair: {found}");
 }
