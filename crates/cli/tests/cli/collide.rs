@@ -280,8 +280,8 @@ fn a_faulty_line_is_named_after_the_answers_before_it() {
     let identity = "[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]";
     let good = format!("{{\"a\":{identity},\"b\":{identity}}}");
     for (bad, word) in [
-        ("nonsense", "column 2"),
-        ("3", "expected an object or an array; a line is {\"a\":[…],\"b\":[…]}"),
+        ("nonsense", "expected JSON as on the first line, got `nonsense`"),
+        ("3", "expected JSON as on the first line, got `3`; a line is {\"a\":[…],\"b\":[…]}"),
         ("[[1]]", "expected the numbers of a pose"),
         (&good.replacen("0,0,0,1]", "7,8,9,1]", 1), "`a`: expected a last row of 0 0 0 1, got a last column"),
         (&good.replacen("[1,0", "[1.123456789,0", 1), "bounds by 0.101, more than 0.0117 (a"),
@@ -348,7 +348,7 @@ fn wrong_usage_ends_with_status_2() {
             &["--pose-a", "1 2 3"][..],
             "--pose-a: expected 16 numbers (a row-major 4×4 matrix), 12 (its first three rows) or 7",
         ),
-        (&["--pose-b", "elsewhere"], "or a file that holds them, got `elsewhere`"),
+        (&["--pose-b", "elsewhere"], "or a file that holds them; found no file `elsewhere`"),
         (&["--budget", "200"], "ns, us, ms or s"),
         (&["--budget", "-3us"], "--budget"),
         (&["--thickened", "-1"], "--thickened"),

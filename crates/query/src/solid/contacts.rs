@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{PlaceVisitor, PointKind, Siblings};
+use nearmiss_hierarchy::{PlaceVisitor, PointKind, Siblings, THICKNESS};
 use nearmiss_lanes::wide::Bits;
 use nearmiss_surface::Status;
 
@@ -59,6 +59,8 @@ struct Gather<'s, 'a> {
     inside: Vector,
     is_oriented: bool,
     found: &'s mut Vec<Candidate>,
+    /// The nearest disc whose thickness the shape touches beside its rim, where it has no depth.
+    beside: Option<Candidate>,
 }
 
 /// Writes the manifold of `solid` and the scan to `contacts`.
@@ -79,9 +81,13 @@ pub(crate) fn contacts(
         let centre = near.lane_box.centre;
         let is_oriented = elements.placed.scan().is_oriented();
         let inside = own.unwrap_or(solid.inside);
-        let mut search = Gather { near, hint: hint.as_deref(), inside, is_oriented, found };
+        let mut search = Gather { near, hint: hint.as_deref(), inside, is_oriented, found, beside: None };
         // The visitor never breaks.
         let _whole = elements.arrays.tree.descend_to(level, centre, &mut search);
+        // A shape that touches has a contact.
+        if let (true, Some(beside)) = (search.found.is_empty(), search.beside) {
+            search.found.push(beside);
+        }
     }
     // Behind a thin plate there is another surface, which would push the shape through.
     if found.iter().any(|it| !it.is_behind) {
@@ -199,7 +205,11 @@ fn refine(
             x = elements.in_world(&point);
             continue;
         }
-        if let Some((_, normal, depth)) = deepest(FlatDisc { radius: PLACE * radius, ..disc }) {
+        // A shape that is beside this place has no depth there.
+        let least = -elements.margin.max(f64::from(THICKNESS) * radius);
+        if let Some((_, normal, depth)) =
+            deepest(FlatDisc { radius: PLACE * radius, ..disc }).filter(|found| found.2 >= least)
+        {
             contact.point = foot.into();
             contact.depth = depth * elements.scale();
             contact.normal = elements.turned(&normal);
@@ -219,6 +229,7 @@ impl Gather<'_, '_> {
             let (gap, thick) = elements.gap(solid, i, elements.margin);
             (gap.distance <= solid.radius + elements.margin.max(thick)).then_some(gap)
         };
+        let mut is_beside = false;
         let found = match elements.element(i) {
             Element::Ball(centre, radius) => {
                 gap().and_then(|gap| of_ball(solid, &gap, (centre, radius))).map(|it| (it, false))
@@ -230,7 +241,11 @@ impl Gather<'_, '_> {
                 let place = if solid.crosses(&disc) {
                     Some(deepest(solid, &disc, out))
                 } else {
-                    gap().and_then(|gap| of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)))
+                    gap().and_then(|gap| {
+                        let place = of_disc(solid, &gap, &disc, (out, is_edge, elements.margin));
+                        is_beside = place.is_none();
+                        place.or(Some((gap.on_disc, out, solid.radius - gap.distance)))
+                    })
                 };
                 place.map(|it| (it, is_behind))
             }
@@ -242,7 +257,12 @@ impl Gather<'_, '_> {
             depth: depth * elements.scale(),
             id: u64::from(elements.placed.scan().id(i).0),
         };
-        self.found.push(Candidate { contact, i, band: elements.band(i), away_sq: f64::INFINITY, is_behind });
+        let found = Candidate { contact, i, band: elements.band(i), away_sq: f64::INFINITY, is_behind };
+        if !is_beside {
+            self.found.push(found);
+        } else if self.beside.is_none_or(|beside| beside.contact.depth < contact.depth) {
+            self.beside = Some(found);
+        }
     }
 
     /// The normal of a disc, in the direction in which the shape moves out: outwards if the scan is

@@ -9,6 +9,7 @@ use nearmiss_query::{
     CollideOptions, Detail, Evidence, Placed, Ray, Scratch, Shape, ShapeContact, ShapeHint, ShapePlan, Target,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use nearmiss_testdata::shapes::{self, Form, Order, Sampling};
 use rand::RngExt;
 
@@ -324,4 +325,38 @@ fn no_ball_is_pushed_through_a_rough_surface() {
         }
     }
     assert!(deep > 1000, "{deep} deep contacts");
+}
+
+#[test]
+fn what_touches_has_contacts_no_further_than_the_margin() {
+    let mesh = dragon_mesh(Dragon::Points5k).unwrap();
+    let cloud = PointCloud::from_positions(mesh.vertices()).unwrap();
+    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let (bounds, r) = (scan.bounds(), scan.sampling_radius());
+    let (rng, scratch, mut contacts) = (&mut rng(11), &mut Scratch::default(), Vec::new());
+    let mut touching = 0;
+    for margin in [0.0, 0.3 * r] {
+        let target = target(&scan, &CollideOptions::default().with_margin(margin));
+        for _ in 0..2000 {
+            let at = [0, 1, 2].map(|k| rng.random_range(bounds.min[k]..bounds.max[k]));
+            let to = [0, 1, 2].map(|k| rng.random_range(bounds.min[k]..bounds.max[k]));
+            let shapes = [
+                Shape::Sphere { centre: at, radius: 0.5 * r },
+                Shape::Capsule { ends: [at, to], radius: 0.0 },
+                Shape::Capsule { ends: [at, [0, 1, 2].map(|k| at[k] + 0.1 * (to[k] - at[k]))], radius: 0.2 * r },
+            ];
+            for shape in shapes {
+                target.contacts(&shape, &mut contacts, scratch);
+                if target.touch(&shape, scratch).verdict.is_touching() {
+                    assert!(!contacts.is_empty(), "a contact of {shape:?} with the margin {margin}");
+                    touching += 1;
+                }
+                // A disc is thick by a twentieth of its radius.
+                let least = -(margin.max(0.05 * scan.reach())) * (1.0 + 1e-3);
+                let deep = contacts.iter().all(|contact| contact.depth >= least);
+                assert!(deep, "{contacts:?} of {shape:?} with the margin {margin}");
+            }
+        }
+    }
+    assert!(touching > 1000, "many shapes touch: {touching}");
 }
