@@ -103,7 +103,7 @@ impl AnswerRecord {
                 (record.witness, record.normal_a, record.normal_b) = (best.point, best.normal_a, best.normal_b);
                 (record.source_a, record.source_b) = (best.triangle_a, best.triangle_b);
             }
-            MeshVerdict::Separated => (record.verdict, record.evidence) = (0, 1),
+            MeshVerdict::Separated => (record.verdict, record.evidence, record.gap) = (0, 1, 0.0),
             MeshVerdict::Pose => record.reason = reason_code(Reason::Pose),
             _ => record.reason = reason_code(Reason::Budget { likelihood: answer.likelihood }),
         }
@@ -135,7 +135,7 @@ answer! {
 fn answer_in_words(record: &AnswerRecord) -> String {
     match record.verdict {
         1 => format!("touching at {:?}{}", record.witness, shown(record.evidence)),
-        0 if record.evidence == 1 => format!("apart by at least {}, certified", record.gap),
+        0 if record.gap > 0.0 => format!("apart by at least {}, certified", record.gap),
         0 => format!("apart{}", shown(record.evidence)),
         _ => undecided(record.reason),
     }

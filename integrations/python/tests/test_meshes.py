@@ -31,6 +31,8 @@ class Meshes(unittest.TestCase):
             answer, apart = mesh.collide(mesh, at(x)), mesh.distance(mesh, at(x))
             self.assertEqual(answer.touches, touches, x)
             self.assertEqual(answer.evidence, "certified", x)
+            self.assertEqual(answer.gap, None if touches else 0.0, x)
+            self.assertNotIn("nan", repr(answer).lower(), x)
             self.assertAlmostEqual(apart.upper, distance, delta=1e-9, msg=str(x))
             self.assertEqual(apart.lower, apart.upper, x)
         lower, upper, direction = mesh.penetration(mesh, at(0.75))

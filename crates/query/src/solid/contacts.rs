@@ -241,12 +241,14 @@ impl Gather<'_, '_> {
                 let place = if solid.crosses(&disc) {
                     Some(deepest(solid, &disc, out))
                 } else {
-                    gap().and_then(|gap| {
-                        let place = of_disc(solid, &gap, &disc, (out, is_edge, elements.margin));
-                        is_beside = place.is_none();
-                        place.or(Some((gap.on_disc, out, solid.radius - gap.distance)))
-                    })
+                    gap().and_then(|gap| of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)))
                 };
+                // What is over the disc may be far above it, and the rest of the shape beside it.
+                let least = -elements.margin.max(f64::from(THICKNESS) * disc.radius);
+                let place = place.filter(|it| it.2 >= least);
+                is_beside = place.is_none();
+                let place =
+                    place.or_else(|| gap().map(|gap| (gap.on_disc, out, solid.radius - gap.distance)));
                 place.map(|it| (it, is_behind))
             }
         };
