@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_hierarchy::{NodeGrid, PointHierarchy};
 use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
 
 /// An index of the points of a scan, for testing thousands of shapes. Pass it to
@@ -17,6 +17,8 @@ pub struct ShapeIndex {
     scan: u64,
     boxes: Arc<BlockBoxes>,
     pub(crate) cells: BlockGrid,
+    /// The nodes near each cell; `None` if some enclosure is unbounded.
+    pub(crate) nodes: Option<Arc<NodeGrid>>,
     pub(crate) level: Level,
 }
 
@@ -27,7 +29,9 @@ impl ShapeIndex {
         let boxes = Arc::new(BlockBoxes::new(scan.blocks(), scan.len()));
         let level = Level::new();
         let cells = boxes.over(scan.blocks()).cells(level);
-        Self { scan: scan.outline().identity, boxes, cells, level }
+        let radius = f64::from(scan.arrays().sampling_radius);
+        let nodes = NodeGrid::new(&scan.tree(), radius, scan.len(), level).map(Arc::new);
+        Self { scan: scan.outline().identity, boxes, cells, nodes, level }
     }
 
     /// Returns `true` if this is the index of `scan`.

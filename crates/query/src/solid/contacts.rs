@@ -74,14 +74,14 @@ pub(crate) fn contacts(
     let own = hint.as_deref().and_then(|hint| hint.centre);
     let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
     if let Some(solid) = solid {
+        let starts = elements.starts(solid, elements.margin);
         let mut near = Near::new(elements, solid, false);
         near.limit(elements.margin);
-        let centre = near.lane_box.centre;
         let is_oriented = elements.placed.scan().is_oriented();
         let inside = own.unwrap_or(solid.inside);
         let mut search = Gather { near, hint: hint.as_deref(), inside, is_oriented, found };
         // The visitor never breaks.
-        let _whole = elements.arrays.tree.descend_to(level, centre, &mut search);
+        let _whole = near.descend(level, &starts, &mut search);
     }
     // Behind a thin plate there is another surface, which would push the shape through.
     if found.iter().any(|it| !it.is_behind) {
