@@ -6,11 +6,13 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_index::Cubes;
+use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::ranges_with;
 
+use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
 use crate::descent::single::PlaceVisitor;
-use crate::descent::starts::{MOST_STARTS, Start, Starts};
+use crate::descent::starts::{MOST_STARTS, Plate, Start, Starts};
 use crate::tree::wide::{Siblings, Tree};
 
 /// The least edge of a cell, in sampling radii.
@@ -38,6 +40,11 @@ pub struct NodeGrid {
     /// The end of the list before each cell, and of the last.
     ends: Vec<usize>,
     nodes: Vec<Start>,
+    /// The plates of the lowest inner nodes, and the first of these.
+    plates: Vec<Plate>,
+    first: u32,
+    /// The rounding error of a distance.
+    lost: f64,
 }
 
 impl NodeGrid {
@@ -64,7 +71,7 @@ impl NodeGrid {
         // Half the diagonal of a cell, a little more.
         let beyond = MARGIN * edge + 0.867 * edge;
         #[expect(clippy::cast_possible_truncation, reason = "counted in `lost`")]
-        let (most, lost) = (((beyond + lost) as f32).next_up(), (lost as f32).next_up());
+        let (most, single) = (((beyond + lost) as f32).next_up(), (lost as f32).next_up());
         let most_sq = (most * most).next_up();
         let lists = ranges_with(
             cubes.count(),
@@ -74,7 +81,7 @@ impl NodeGrid {
                 let (mut ends, mut nodes) = (Vec::new(), Vec::new());
                 for cell in range {
                     let first = nodes.len();
-                    let mut search = Search { tree, most_sq, lost, found: &mut nodes };
+                    let mut search = Search { tree, most_sq, lost: single, found: &mut nodes };
                     #[expect(clippy::cast_possible_truncation, reason = "counted in `lost`")]
                     let place = cubes.centre(cell).map(|c| c as f32);
                     // The visitor never breaks.
@@ -92,7 +99,10 @@ impl NodeGrid {
                 (ends, nodes)
             },
         );
-        let mut grid = Self { cubes, margin, ends: vec![0], nodes: Vec::new() };
+        let lowest = tree.topology.first_bottom()..tree.topology.inner();
+        let first = id32(lowest.start);
+        let plates = lowest.map(|i| plate(&tree.enclosure(Part::Obstacle, NodeId(id32(i))))).collect();
+        let mut grid = Self { cubes, margin, ends: vec![0], nodes: Vec::new(), plates, first, lost };
         for (ends, nodes) in lists {
             let before = grid.nodes.len();
             grid.ends.extend(ends.into_iter().map(|end| before + end));
@@ -108,8 +118,7 @@ impl NodeGrid {
     #[must_use]
     pub fn near(&self, place: [f64; 3], core: f64, reach: f64) -> Option<Starts<'_>> {
         let all = core + reach;
-        // Also for NaN.
-        if !(all <= self.margin) {
+        if all.is_nan() || all > self.margin {
             return None;
         }
         let Some((cell, off_sq)) = self.cubes.about(place) else { return Some(Starts::NONE) };
@@ -120,9 +129,25 @@ impl NodeGrid {
         let off = off_sq.sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
         let [within, beyond] = [off + all, off + core].map(|x| ((x * (1.0 + 1e-6)) as f32).next_up());
+        #[expect(clippy::cast_possible_truncation, reason = "counted in `lost`")]
+        let (single, most) = (place.map(|c| c as f32), ((all + self.lost) as f32).next_up());
         let further = nodes.iter().take_while(|start| start.distance > within).count();
-        Some(Starts { nodes: &nodes[further..], beyond })
+        Some(Starts {
+            nodes: &nodes[further..],
+            beyond,
+            plates: (&self.plates, self.first),
+            place: single,
+            most,
+        })
     }
+}
+
+/// Returns the plate of an enclosure.
+fn plate(bounds: &OrientedBox) -> Plate {
+    let OrientedBox { centre, half, axes, .. } = *bounds;
+    let thinnest = if half[1] <= half[2] { 1 } else { 2 };
+    let thinnest = if half[0] <= half[thinnest] { 0 } else { thinnest };
+    Plate { centre, radius: bounds.radius(), normal: axes[thinnest], half: half[thinnest] }
 }
 
 /// The search for the nodes of a cell.
