@@ -240,24 +240,14 @@ impl<'a> Solid<'a> {
 
     /// Returns `true` if a core that is a segment or a box certainly crosses a disc.
     pub(crate) fn crosses(&self, disc: &FlatDisc) -> bool {
-        self.crossing(disc).is_some()
-    }
-
-    /// A place of a disc that is certainly in a core that is a segment or a box.
-    fn crossing(&self, disc: &FlatDisc) -> Option<Vector> {
         let reach: f64 = (0..3).map(|k| (self.axes[k].dot(&disc.normal) * self.half[k]).abs()).sum();
         if disc.normal.dot(&(self.centre - disc.centre)).abs() > reach {
-            return None;
+            return false;
         }
-        // Between a place below the disc and one above it.
-        let place = |out: Vector| {
-            let lowest = self.lowest_over(disc, &out)?;
-            let depth = -out.dot(&(lowest - disc.centre));
-            (depth >= 0.0).then_some((lowest, depth))
+        let side = |out: Vector| {
+            self.lowest_over(disc, &out).is_some_and(|lowest| out.dot(&(lowest - disc.centre)) <= 0.0)
         };
-        let ((below, depth), (above, height)) = (place(disc.normal)?, place(-disc.normal)?);
-        let all = depth + height;
-        Some(if all > 0.0 { below + (above - below) * (depth / all) } else { below })
+        side(disc.normal) && side(-disc.normal)
     }
 
     /// The point of the core furthest along `d`.
@@ -332,9 +322,6 @@ impl<'a> Solid<'a> {
                 Gap::of(found.on_triangle, found.on_disc)
             }
             Core::Box | Core::Round(_) => {
-                if let Some(x) = self.crossing(disc) {
-                    return Gap { distance: 0.0, lower: 0.0, on_core: x, on_disc: disc.nearest(&x) };
-                }
                 self.projected(disc).unwrap_or_else(|start| self.iterated(disc, start, beyond))
             }
             Core::Hull(..) | Core::Own(..) => self.iterated(disc, self.inside - disc.centre, beyond),
