@@ -36,9 +36,9 @@ pub(crate) struct LaneRay {
 pub(crate) struct LaneCrossings {
     /// The points that the ray passes within their reach, as bits.
     pub(crate) near: u32,
-    /// Those of `near` that the ray certainly does not meet before the end of the search.
+    /// The points of `near` that the ray certainly does not meet before the end of the search.
     pub(crate) missed: u32,
-    /// Those of `near` whose disc or cell the ray certainly crosses.
+    /// The points of `near` whose disc or cell the ray certainly crosses.
     pub(crate) met: u32,
     /// The distances of the crossings from the start.
     pub(crate) t: [f32; WIDTH],
