@@ -15,8 +15,8 @@ pub use bounds::cells::CELLS;
 pub use bounds::growth::Growth;
 pub use bounds::part::Part;
 pub use descent::{
-    BoxVisitor, Comparison, Frontier, Heap, MostUrgent, Open, PairVisitor, PlaceVisitor, Plunging, Stack,
-    TreePair, descend, resume,
+    BoxVisitor, Comparison, Frontier, Heap, MostUrgent, NodeGrid, Open, PairVisitor, PlaceVisitor, Plunging,
+    Stack, Starts, TreePair, descend, resume,
 };
 pub use mesh::block::{LEAF_TRIANGLES, TriangleBlock};
 pub use mesh::build::{MeshHierarchy, MeshView};

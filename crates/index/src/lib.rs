@@ -2,8 +2,10 @@
 #![forbid(unsafe_code)]
 
 mod block;
+mod cubes;
 mod tree;
 
 pub use block::PointBlock;
+pub use cubes::Cubes;
 pub use fearless_simd::Level;
 pub use tree::{BlockBoxes, BlockGrid, BlockTree, Cones, Nearest, Neighbour, Overlaps, Skeleton};

@@ -14,6 +14,7 @@ pub(crate) mod lanes;
 pub(crate) mod meeting;
 pub(crate) mod plan;
 pub(crate) mod ray;
+pub(crate) mod ray_lanes;
 pub(crate) mod scratch;
 pub(crate) mod shape;
 pub(crate) mod touch;

@@ -78,6 +78,13 @@ impl LeafBlock {
         if self.step > 0.0 { 1.0 / self.step } else { 0.0 }
     }
 
+    /// Returns the unit in which positions and radii are stored.
+    #[inline(always)]
+    #[must_use]
+    pub fn step(&self) -> f32 {
+        self.step
+    }
+
     /// Returns the position in a lane.
     ///
     /// # Panics

@@ -343,6 +343,22 @@ fn each<V, W>([x, y, z]: [V; 3], replaced: &impl Fn(V) -> W) -> [W; 3] {
     [replaced(x), replaced(y), replaced(z)]
 }
 
+impl<S: Simd> NodeBounds<f32x4<S>> {
+    /// Returns the squared distances of a position from the enclosures.
+    #[inline(always)]
+    #[must_use]
+    pub fn distances_sq(&self, simd: S, [x, y, z]: [f32; 3]) -> f32x4<S> {
+        let d = [self.centre[0] - x, self.centre[1] - y, self.centre[2] - z];
+        let mut sum = f32x4::splat(simd, 0.0);
+        for k in 0..3 {
+            let (at, half) = (product(self.axes[k], d), self.half[k]);
+            let beyond = (at - half - self.low[k]).max(-at - half - self.high[k]).max(0.0);
+            sum += beyond * beyond;
+        }
+        sum
+    }
+}
+
 /// Concatenates the lanes of four vectors.
 #[inline(always)]
 fn combined<S: Simd>([a, b, c, d]: [[f32x4<S>; 3]; FAN]) -> [f32x16<S>; 3] {

@@ -7,6 +7,7 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{Bits, bits, load, squared};
 
 use super::{BlockTree, Bounds};
+use crate::cubes::Cubes;
 
 /// The maximum number of cells for each point. A cell takes eight bytes.
 const CELLS_A_POINT: f64 = 1.0;
@@ -30,9 +31,7 @@ const CROWDED: u32 = u32::MAX;
 /// each point.
 #[derive(Debug, Clone)]
 pub struct BlockGrid {
-    min: [f64; 3],
-    per_cell: f64,
-    size: [usize; 3],
+    cubes: Cubes,
     /// Every block with a point within this distance of a position in a cell is listed by the cell.
     margin: f64,
     /// The start of each cell's list in `named`, and its length.
@@ -112,7 +111,7 @@ impl BlockTree<'_> {
                         for lane in Bits(near) {
                             distance_sq = distance_sq.min(distances[lane]);
                         }
-                        let cell = id32((x * cells.size[1] + y) * cells.size[2] + z);
+                        let cell = id32(cells.cubes.number([x, y, z]));
                         all.push(Named { cell, block: id32(block), distance_sq });
                     }
                 }
@@ -121,12 +120,7 @@ impl BlockTree<'_> {
     }
 
     /// Returns the grid with empty lists.
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "cells are counted in small numbers"
-    )]
+    #[expect(clippy::cast_precision_loss, reason = "a count")]
     fn grid(&self) -> BlockGrid {
         let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for block in 0..self.blocks.len() {
@@ -136,26 +130,14 @@ impl BlockTree<'_> {
                 max[k] = max[k].max(f64::from(bounds.max[k]));
             }
         }
-        let most = CELLS_A_POINT * self.points as f64;
-        // Shrink the edge until the grid, margin included, has about as many cubes as allowed.
-        let longest = (0..3).fold(f64::MIN_POSITIVE, |longest: f64, k| longest.max(max[k] - min[k]));
-        let count = |edge: f64| {
-            (0..3).map(|k| ((max[k] - min[k]) / edge + 2.0 * MARGIN).floor() + 1.0).product::<f64>()
-        };
-        let mut edge = longest;
-        while count(0.9 * edge) <= most {
-            edge *= 0.9;
-        }
-        let margin = MARGIN * edge;
+        let cubes = Cubes::new([min, max], MARGIN, (0.0, CELLS_A_POINT * self.points as f64));
+        let edge = cubes.edge();
         let far = (0..3).fold(edge, |far, k| far.max(min[k].abs()).max(max[k].abs()));
-        let size = [0, 1, 2].map(|k| ((max[k] - min[k]) / edge + 2.0 * MARGIN) as usize + 1);
         BlockGrid {
-            min: min.map(|c| c - margin),
-            per_cell: 1.0 / edge,
-            size,
+            cubes,
             // Cell lookup and block lists work with rounded numbers.
-            margin: margin * (1.0 - 1e-5) - ROUNDING * far,
-            ranges: vec![[0, 0]; size.iter().product()],
+            margin: MARGIN * edge * (1.0 - 1e-5) - ROUNDING * far,
+            ranges: vec![[0, 0]; cubes.count()],
             named: Vec::new(),
         }
     }
@@ -171,40 +153,32 @@ impl BlockGrid {
         if radius.is_nan() || radius > self.margin {
             return None;
         }
-        let mut cell = 0;
-        for k in 0..3 {
-            let at = (place[k] - self.min[k]) * self.per_cell;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-            let number = at as usize;
-            // No points are within the margin of a place outside the grid, and none are near NaN.
-            if at.is_nan() || at < 0.0 || number >= self.size[k] {
-                return Some(&[]);
-            }
-            cell = cell * self.size[k] + number;
-        }
+        // No points are within the margin of a place outside the grid, and none are near NaN.
+        let Some(cell) = self.cubes.at(place) else { return Some(&[]) };
         let [first, count] = self.ranges[cell];
         if count == CROWDED { None } else { self.named.get(first as usize..(first + count) as usize) }
     }
 
     /// Returns the range of cells along each axis that a box may be within the margin of.
     fn reached(&self, bounds: &Bounds) -> [std::ops::RangeInclusive<usize>; 3] {
+        let size = self.cubes.size();
         [0, 1, 2].map(|k| {
             // Slightly more, because of rounding.
-            let reach = (MARGIN + 1e-6) / self.per_cell;
-            let cell = |c: f64| (c - self.min[k]) * self.per_cell;
+            let reach = MARGIN + 1e-6;
+            let cell = |c: f32| self.cubes.along(k, f64::from(c));
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
-            let range = cell(f64::from(bounds.min[k]) - reach).max(0.0) as usize
-                ..=(cell(f64::from(bounds.max[k]) + reach) as usize).min(self.size[k] - 1);
+            let range = (cell(bounds.min[k]) - reach).max(0.0) as usize
+                ..=((cell(bounds.max[k]) + reach) as usize).min(size[k] - 1);
             range
         })
     }
 
     /// Returns the cube of a cell and the margin around it, both rounded.
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "the margin covers it")]
+    #[expect(clippy::cast_possible_truncation, reason = "the margin covers it")]
     fn cube(&self, cell: [usize; 3]) -> (Bounds, f32) {
-        let edge = 1.0 / self.per_cell;
-        let side = |k: usize, beyond: f64| (self.min[k] + edge * (cell[k] as f64 + beyond)) as f32;
-        let (min, max) = ([0, 1, 2].map(|k| side(k, 0.0)), [0, 1, 2].map(|k| side(k, 1.0)));
+        let edge = self.cubes.edge();
+        let corner = self.cubes.corner(cell);
+        let (min, max) = (corner.map(|c| c as f32), corner.map(|c| (c + edge) as f32));
         (Bounds { min, max, support_radius: 0.0 }, (MARGIN * edge) as f32)
     }
 }

@@ -4,7 +4,7 @@
 //! Otherwise the nearest point of the triangle is on an edge, or it is a foot of the disc on the
 //! face: the foot of the point of the rim that is nearest to the plane of the triangle, or of the
 //! centre if the planes are parallel. Along an edge the squared distance from the disc is convex and
-//! has a continuous derivative, whose zero is found by bisection and secants.
+//! has a continuous derivative, whose zero is found by Newton's method.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_mesh::{Corners, nearest_on_triangle, unit_normal};
@@ -109,55 +109,72 @@ impl FlatDisc {
 
     /// The share of the edge from `p` along `way` at which it is nearest to the disc.
     ///
-    /// The zero of the derivative is found by false position. If an end stays twice, its value is halved
-    /// (the Illinois rule).
+    /// The zero of the derivative is found by Newton's method, and by bisection where that leaves the
+    /// bracket or, at the rim, goes to and fro.
     pub(crate) fn nearest_share(&self, p: Vector3<f64>, way: Vector3<f64>) -> f64 {
-        const ROUNDS: u32 = 60;
+        const ROUNDS: u32 = 80;
+        /// Rounds after which every other one is a bisection.
+        const QUICK: u32 = 8;
         /// In disc radii. The error of a distance is of second order in that of the place.
         const PRECISION: f64 = 1e-9;
-        let length = way.norm();
+        let square = way.norm_squared();
         // Also if the edge is a point.
-        let per_radius = (self.radius / length).min(2.0);
+        let per_radius = (self.radius / square.sqrt()).min(2.0);
         // The nearest place of the disc is within its radius of the centre, and so are their feet.
-        let middle = ((self.centre - p).dot(&way) / (length * length)).clamp(0.0, 1.0);
+        let middle = ((self.centre - p).dot(&way) / square).clamp(0.0, 1.0);
         let middle = if middle.is_nan() { 0.0 } else { middle };
-        let (mut low, mut high) = ((middle - per_radius).max(0.0), (middle + per_radius).min(1.0));
-        // Derivative of half the squared distance along the edge.
-        let slope = |share: f64| {
-            let x = p + way * share;
-            (x - self.nearest(&x)).dot(&way)
+        // From the middle, so that rounding is relative to what is near the disc.
+        let (mut low, mut high) = (-middle.min(per_radius), (1.0 - middle).min(per_radius));
+        let away = p + way * middle - self.centre;
+        let (height, rise) = (self.normal.dot(&away), self.normal.dot(&way));
+        let (from, across) = (away - self.normal * height, way - self.normal * rise);
+        let (a, b, c) = (across.norm_squared(), from.dot(&across), from.norm_squared());
+        let radius_sq = self.radius * self.radius;
+        // The derivative of half the squared distance along the edge, and its own.
+        let slope = |s: f64| {
+            let of_plane = rise * (height + s * rise);
+            let beside_sq = c + s * (2.0 * b + s * a);
+            if beside_sq <= radius_sq {
+                return (of_plane, rise * rise);
+            }
+            let (share, along) = (self.radius / beside_sq.sqrt(), b + s * a);
+            let curve = (1.0 - share) * a + share * along * along / beside_sq;
+            (of_plane + (1.0 - share) * along, rise * rise + curve)
         };
-        let (mut below, mut above) = (slope(low), slope(high));
-        if below >= 0.0 {
-            return low;
+        let (mut s, mut own) = (0.0, slope(0.0));
+        if own.0 < 0.0 && slope(high).0 <= 0.0 {
+            return middle + high;
         }
-        if above <= 0.0 {
-            return high;
+        if own.0 > 0.0 && slope(low).0 >= 0.0 {
+            return middle + low;
         }
         let near = PRECISION * per_radius;
-        let (mut middle, mut was_below) = (low, None);
-        for _ in 0..ROUNDS {
-            let next = low + (high - low) * (below / (below - above));
-            let own = slope(next);
-            let change = (next - middle).abs();
-            middle = next;
-            if own == 0.0 || change <= near || high - low <= near {
+        for round in 0..ROUNDS {
+            if own.0 < 0.0 {
+                low = s;
+            } else if own.0 > 0.0 {
+                high = s;
+            } else {
                 break;
             }
-            let share = if was_below == Some(own < 0.0) { 0.5 } else { 1.0 };
-            if own < 0.0 {
-                (low, below, above) = (middle, own, share * above);
-            } else {
-                (high, above, below) = (middle, own, share * below);
+            let next = s - own.0 / own.1;
+            let is_in = next > low && next < high && (round < QUICK || round.is_multiple_of(2));
+            let next = if is_in { next } else { 0.5 * (low + high) };
+            let change = (next - s).abs();
+            s = next;
+            if change <= near || high - low <= near {
+                break;
             }
-            was_below = Some(own < 0.0);
+            own = slope(s);
         }
-        middle
+        middle + s
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use nearmiss_testdata::arbitrary::{point_in, rng};
+
     use super::*;
 
     #[test]
@@ -184,5 +201,38 @@ mod tests {
             let apart = (found.on_triangle - found.on_disc).norm();
             assert!((apart - distance).abs() < 1e-9, "{what}: {found:?}");
         }
+    }
+
+    #[test]
+    fn the_nearest_place_of_an_edge_is_that_of_a_plain_search() {
+        let rng = &mut rng(5);
+        let mut inner = 0;
+        for round in 0..3000_i32 {
+            // Edges through the disc, along its plane, beside it, and long or far ones.
+            let size = 10.0_f64.powi(round % 5 - 2);
+            let [mut p, way] = [3.0, size].map(|size| Vector3::from(point_in(rng, size)));
+            let disc = FlatDisc { centre: Vector3::zeros(), normal: Vector3::z(), radius: 1.0 };
+            if round % 7 == 0 {
+                p.z = 0.0;
+            }
+            let apart = |share: f64| {
+                let x = p + way * share;
+                (x - disc.nearest(&x)).norm()
+            };
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..200 {
+                let third = (high - low) / 3.0;
+                if apart(low + third) <= apart(high - third) {
+                    high -= third;
+                } else {
+                    low += third;
+                }
+            }
+            let (own, least) = (disc.nearest_share(p, way), apart(0.5 * (low + high)));
+            assert!((0.0..=1.0).contains(&own), "a place of the edge: {own}");
+            assert!((apart(own) - least).abs() < 1e-8, "{p:?} {way:?}: {} for {least}", apart(own));
+            inner += u32::from(own > 0.0 && own < 1.0);
+        }
+        assert!(inner > 500, "{inner} places inside");
     }
 }

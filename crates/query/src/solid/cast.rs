@@ -8,11 +8,11 @@
 use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, f32x4, f32x16, mask32x4, mask32x16};
+use fearless_simd::{Level, Simd, f32x4, mask32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{PlaceVisitor, PointKind, SLAB, Siblings};
-use nearmiss_lanes::wide::{Bits, along, bits, product, squared};
+use nearmiss_lanes::wide::{Bits, product};
 use nearmiss_surface::Status;
 
 use crate::ask::answer::Evidence;
@@ -21,10 +21,9 @@ use crate::leaf::disc_triangle::FlatDisc;
 use crate::pair::placed::ViewScratch;
 use crate::solid::elements::{Element, Elements};
 use crate::solid::ray::{RayHit, StoredRay};
+use crate::solid::ray_lanes::LaneRay;
 
 type Vector = Vector3<f64>;
-
-const WIDTH: usize = 16;
 
 /// Rounding of places, relative to all coordinates.
 const ROUNDING: f64 = 8e-6;
@@ -75,14 +74,13 @@ struct Cast<'s, 'a> {
     elements: &'s Elements<'a>,
     ray: StoredRay,
     wanted: Wanted,
-    /// The start in single precision: where the ray comes near the scan.
-    from: [f32; 3],
-    along: [f32; 3],
+    /// The ray from where it comes near the scan, in single precision.
+    lanes: LaneRay,
     /// The distance of that place from the origin.
     skipped: f64,
     /// The radius and the rounding error.
     thick: f32,
-    /// The distance from `from` beyond which nothing is of interest.
+    /// The distance from that place beyond which nothing is of interest.
     most: f32,
     most_sq: f32,
     found: &'s mut Vec<Crossing>,
@@ -114,12 +112,14 @@ pub(crate) fn crossings(
         (|v: Vector| [v.x as f32, v.y as f32, v.z as f32], (ROUNDING * (elements.far + 2.0 * size)) as f32);
     #[expect(clippy::cast_possible_truncation, reason = "counted in `thick`")]
     let thick = (ray.radius + elements.beyond_boxes()) as f32 + slack;
+    #[expect(clippy::cast_possible_truncation, reason = "those near the ends are compared again")]
+    let ends = [-skipped as f32, (ray.max - skipped) as f32];
+    let (from, along) = (single(ray.at(skipped)), single(ray.direction));
     let mut search = Cast {
         elements,
         ray: *ray,
         wanted,
-        from: single(ray.at(skipped)),
-        along: single(ray.direction),
+        lanes: LaneRay { from, along, lost: slack, ends },
         skipped,
         thick,
         most: f32::INFINITY,
@@ -128,7 +128,6 @@ pub(crate) fn crossings(
         is_doubtful: elements.of_separation(false) == Evidence::Estimated,
     };
     search.limit(ray.max);
-    let from = search.from;
     // Ends early if any hit will do.
     let _ended = elements.arrays.tree.descend_to(level, from, &mut search);
     let evidence = elements.of_separation(search.is_doubtful);
@@ -178,10 +177,9 @@ fn hit(
     crossing: &Crossing,
     scratch: &mut ViewScratch,
 ) -> Option<RayHit> {
-    let Crossing { i, t, beside, .. } = *crossing;
+    let i = crossing.i;
     let (placed, scale) = (&elements.placed, elements.scale());
     let source = placed.scan().id(i);
-    let x = ray.at(t);
     let told = |t: f64, point: Vector, normal: Vector, evidence| RayHit {
         t: t * scale,
         point: elements.in_world(&point),
@@ -191,11 +189,16 @@ fn hit(
     };
     let disc = match elements.element(i) {
         Element::Ball(centre, radius) => {
-            let normal = (x - centre).try_normalize(0.0).unwrap_or(-ray.direction);
+            let t = crossing.t;
+            let normal = (ray.at(t) - centre).try_normalize(0.0).unwrap_or(-ray.direction);
             return Some(told(t, centre + normal * radius, normal, Evidence::Certified));
         }
         Element::Disc(disc) => disc,
     };
+    // The crossing may be known in single precision only.
+    let cell = f64::from(elements.arrays.cell_radius(i)).max(disc.radius);
+    let Crossing { t, beside, .. } = meets(ray, &disc, i, cell).unwrap_or(*crossing);
+    let x = ray.at(t);
     let towards = disc.normal * 1.0_f64.copysign(-disc.normal.dot(&ray.direction));
     let side = |normal: Vector| {
         if placed.scan().is_oriented() && normal.dot(&disc.normal) < 0.0 { -normal } else { normal }
@@ -278,41 +281,6 @@ impl Cast<'_, '_> {
         self.most_sq = (self.most * self.most).next_up().min(f32::MAX);
     }
 
-    /// The lanes of the points of a block that the ray passes within their reach.
-    #[inline(always)]
-    fn near<S: Simd>(&self, simd: S, first: usize, count: usize) -> u32 {
-        let arrays = &self.elements.arrays;
-        let (mut positions, mut reaches) = ([[0.0; WIDTH]; 3], [0.0; WIDTH]);
-        let is_block = first.is_multiple_of(WIDTH) && self.elements.semantics == Semantics::Obstacle;
-        let positions = if is_block {
-            reaches = arrays.obstacle_reaches(first / WIDTH);
-            &arrays.blocks[first / WIDTH].position
-        } else {
-            for (lane, i) in (first..first + count).enumerate() {
-                let p = arrays.position(i);
-                for k in 0..3 {
-                    positions[k][lane] = p[k];
-                }
-                reaches[lane] = self.elements.ray_reach(i);
-            }
-            &positions
-        };
-        let [x, y, z] = positions;
-        let [fx, fy, fz] = self.from;
-        let d = [
-            f32x16::load_array_ref(simd, x) - fx,
-            f32x16::load_array_ref(simd, y) - fy,
-            f32x16::load_array_ref(simd, z) - fz,
-        ];
-        let t = along(d, self.along);
-        let [ax, ay, az] = self.along;
-        let off = squared([d[0] - t * ax, d[1] - t * ay, d[2] - t * az]);
-        let reach = f32x16::load_array_ref(simd, &reaches) + self.thick;
-        let beyond: mask32x16<S> =
-            off.simd_gt(reach * reach) | (t - reach).simd_gt(self.most) | (t + reach).simd_lt(0.0);
-        !bits(beyond) & ((1 << count) - 1)
-    }
-
     /// Compares the ray with the part of a point.
     fn compare(&mut self, i: usize) -> ControlFlow<()> {
         let (elements, ray) = (self.elements, self.ray);
@@ -334,6 +302,11 @@ impl Cast<'_, '_> {
         let Some(crossing) = crossing.filter(|it| it.t <= ray.max) else {
             return ControlFlow::Continue(());
         };
+        self.note(crossing)
+    }
+
+    /// Adds a crossing. Ends the search if it is enough.
+    fn note(&mut self, crossing: Crossing) -> ControlFlow<()> {
         self.found.push(crossing);
         if !crossing.is_sure() {
             return ControlFlow::Continue(());
@@ -341,7 +314,7 @@ impl Cast<'_, '_> {
         match self.wanted {
             Wanted::Any => return ControlFlow::Break(()),
             Wanted::First => {
-                let end = (crossing.t + crossing.layer(elements)).min(ray.max);
+                let end = (crossing.t + crossing.layer(self.elements)).min(self.ray.max);
                 if end < self.skipped + f64::from(self.most) {
                     self.limit(end);
                 }
@@ -436,7 +409,7 @@ impl PlaceVisitor for Cast<'_, '_> {
     fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
         let elements = self.elements;
         let nodes = elements.arrays.tree.bounds_of_children(simd, elements.part(), node);
-        let [fx, fy, fz] = self.from;
+        let [fx, fy, fz] = self.lanes.from;
         let d = [nodes.centre[0] - fx, nodes.centre[1] - fy, nodes.centre[2] - fz];
         let zero = f32x4::splat(simd, 0.0);
         let infinite = f32x4::splat(simd, f32::INFINITY);
@@ -445,7 +418,8 @@ impl PlaceVisitor for Cast<'_, '_> {
         for k in 0..3 {
             let [x, y, z] = nodes.axes[k];
             let at = product([x, y, z], d);
-            let speed = x * self.along[0] + y * self.along[1] + z * self.along[2];
+            let [ax, ay, az] = self.lanes.along;
+            let speed = x * ax + y * ay + z * az;
             let is_still: mask32x4<S> = speed.abs().simd_lt(tiny);
             let speed = is_still.select(tiny, speed);
             let per_speed = f32x4::splat(simd, 1.0) / speed;
@@ -465,8 +439,21 @@ impl PlaceVisitor for Cast<'_, '_> {
         if elements.certifies && elements.semantics == Semantics::Surface {
             self.is_doubtful = true;
         }
-        for (_, first, count) in elements.arrays.leaves.blocks(number) {
-            for lane in Bits(self.near(simd, first, count)) {
+        // Single precision decides about rays without thickness.
+        let is_thin = self.ray.radius == 0.0 && elements.semantics == Semantics::Obstacle;
+        for (block, first, count) in elements.arrays.leaves.blocks(number) {
+            let parts = elements.parts(simd, number, (block, first, count), true);
+            let found = self.lanes.crossings(simd, (block, count), &parts, (self.most, self.thick));
+            let met = if is_thin { found.met } else { 0 };
+            // A ray that crosses a cell passes through what may contain the obstacle.
+            self.is_doubtful |= met != 0;
+            for lane in Bits(met) {
+                let [t, beside, cosine] =
+                    [found.t[lane], found.beside[lane], found.cosine[lane]].map(f64::from);
+                self.note(Crossing { t: (self.skipped + t).max(0.0), i: first + lane, beside, cosine })?;
+            }
+            let missed = if is_thin && self.is_doubtful { found.missed } else { 0 };
+            for lane in Bits(found.near & !met & !missed) {
                 self.compare(first + lane)?;
             }
         }

@@ -76,14 +76,14 @@ pub(crate) fn contacts(
     let own = hint.as_deref().and_then(|hint| hint.centre);
     let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
     if let Some(solid) = solid {
+        let starts = elements.starts(solid, elements.margin);
         let mut near = Near::new(elements, solid, false);
         near.limit(elements.margin);
-        let centre = near.lane_box.centre;
         let is_oriented = elements.placed.scan().is_oriented();
         let inside = own.unwrap_or(solid.inside);
         let mut search = Gather { near, hint: hint.as_deref(), inside, is_oriented, found, beside: None };
         // The visitor never breaks.
-        let _whole = elements.arrays.tree.descend_to(level, centre, &mut search);
+        let _whole = near.descend(level, &starts, &mut search);
         // A shape that touches has a contact.
         if let (true, Some(beside)) = (search.found.is_empty(), search.beside) {
             search.found.push(beside);

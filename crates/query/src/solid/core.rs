@@ -164,10 +164,19 @@ impl<'a> Solid<'a> {
     /// disc with that axis. `None` if the core is neither, or is beside the cylinder.
     pub(crate) fn lowest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
         match self.core {
-            Core::Segment => lowest_of_edge(self.ends(), disc, out),
+            Core::Segment => self.lowest_of_segment(disc, out),
             Core::Box => self.lowest_of_box(disc, out),
             _ => None,
         }
+    }
+
+    fn lowest_of_segment(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
+        let across = |v: Vector| v - out * out.dot(&v);
+        let edge = self.axes[0] * self.half.x;
+        let (from, way) = (across(self.centre - disc.centre), across(edge));
+        let c = from.norm_squared() - disc.radius * disc.radius;
+        let [low, high] = least_range(way.norm_squared(), from.dot(&way), c)?;
+        Some(self.centre + edge * if out.dot(&edge) < 0.0 { high } else { low })
     }
 
     /// The lowest place of a box over a disc that its lowest corner is beside of: above the rim, on an
@@ -176,46 +185,65 @@ impl<'a> Solid<'a> {
         /// Slopes below this are level.
         const LEVEL: f64 = 1e-12;
         let mut best: Option<(f64, Vector)> = None;
-        let mut offer = |x: Vector| {
-            let height = out.dot(&x);
+        // A height over the centre of the box, and the place in half edges from there.
+        let mut offer = |height: f64, place: Vector| {
             if best.is_none_or(|(least, _)| height < least) {
-                best = Some((height, x));
+                best = Some((height, place));
             }
         };
+        let across = |v: Vector| v - out * out.dot(&v);
         let rises = self.axes.map(|axis| axis.dot(out));
+        let away = across(self.centre - disc.centre);
+        let edges = [0, 1, 2].map(|k| (self.axes[k] - out * rises[k]) * self.half[k]);
+        let along = edges.map(|edge| away.dot(&edge));
+        let product = edges.map(|edge| edges.map(|other| edge.dot(&other)));
+        let beyond = away.norm_squared() - disc.radius * disc.radius;
         for k in 0..3 {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            let along = self.axes[k] * self.half[k];
             for [a, b] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
                 // Between two faces that look up.
                 if a * rises[i] > 0.0 && b * rises[j] > 0.0 {
                     continue;
                 }
-                let middle =
-                    self.centre + self.axes[i] * (a * self.half[i]) + self.axes[j] * (b * self.half[j]);
-                lowest_of_edge([middle - along, middle + along], disc, out).into_iter().for_each(&mut offer);
+                // The square of the distance from the axis, less that of the radius, along the edge.
+                let sides = a * along[i] + b * along[j] + a * b * product[i][j];
+                let c = beyond + product[i][i] + product[j][j] + 2.0 * sides;
+                let h = along[k] + a * product[i][k] + b * product[j][k];
+                let Some([low, high]) = least_range(product[k][k], h, c) else { continue };
+                let mut place = Vector::zeros();
+                (place[i], place[j], place[k]) = (a, b, if rises[k] < 0.0 { high } else { low });
+                let height = (0..3).map(|m| rises[m] * self.half[m] * place[m]).sum();
+                offer(height, place);
             }
             if rises[k].abs() <= LEVEL {
                 continue;
             }
-            // The face across axis k that looks down.
-            let normal = self.axes[k] * -1.0_f64.copysign(rises[k]);
-            let across = normal - out * normal.dot(out);
-            let slope = across.norm();
-            let rim = if slope > LEVEL { across * (disc.radius / slope) } else { Vector::zeros() };
-            let place = disc.centre - rim;
-            let height = normal.dot(&(place - self.centre - normal * self.half[k])) / rises[k].abs();
-            let x = place + out * height;
-            let is_on = |m: usize| self.axes[m].dot(&(x - self.centre)).abs() <= self.half[m];
+            // The face across axis k that looks down, at the place of the rim where it is lowest.
+            let side = -1.0_f64.copysign(rises[k]);
+            let downhill = across(self.axes[k] * side);
+            let slope = downhill.norm();
+            let rim = if slope > LEVEL { downhill * (disc.radius / slope) } else { Vector::zeros() };
+            let beside = away + rim;
+            // From the centre of the box to the place on the face.
+            let height = (self.half[k] + side * self.axes[k].dot(&beside)) / -rises[k].abs();
+            let from = out * height - beside;
+            let is_on = |m: usize| self.axes[m].dot(&from).abs() <= self.half[m];
             if is_on(i) && is_on(j) {
-                offer(x);
+                let in_halves =
+                    |m: usize| if self.half[m] > 0.0 { self.axes[m].dot(&from) / self.half[m] } else { 0.0 };
+                offer(height, Vector::from([0, 1, 2].map(in_halves)));
             }
         }
-        best.map(|(_, x)| x)
+        let (_, place) = best?;
+        Some((0..3).fold(self.centre, |x, k| x + self.axes[k] * (self.half[k] * place[k])))
     }
 
     /// Returns `true` if a core that is a segment or a box certainly crosses a disc.
     pub(crate) fn crosses(&self, disc: &FlatDisc) -> bool {
+        let reach: f64 = (0..3).map(|k| (self.axes[k].dot(&disc.normal) * self.half[k]).abs()).sum();
+        if disc.normal.dot(&(self.centre - disc.centre)).abs() > reach {
+            return false;
+        }
         let side = |out: Vector| {
             self.lowest_over(disc, &out).is_some_and(|lowest| out.dot(&(lowest - disc.centre)) <= 0.0)
         };
@@ -334,21 +362,15 @@ impl<'a> Solid<'a> {
     }
 }
 
-/// The lowest place, against `out`, of a segment within the cylinder over a disc with that axis.
-fn lowest_of_edge([p, q]: [Vector; 2], disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-    let across = |v: Vector| v - out * out.dot(&v);
-    let (from, way) = (across(p - disc.centre), across(q - p));
-    let (a, b) = (way.norm_squared(), from.dot(&way));
-    let c = from.norm_squared() - disc.radius * disc.radius;
-    let (low, high) = if a > 0.0 {
-        let root = (b * b - a * c).max(0.0).sqrt();
-        (((-b - root) / a).max(0.0), ((-b + root) / a).min(1.0))
-    } else {
-        (0.0, 1.0)
-    };
-    let is_over = low <= high && (a == 0.0 && c <= 0.0 || b * b >= a * c);
-    let lower = if out.dot(&(q - p)) < 0.0 { high } else { low };
-    is_over.then(|| p + (q - p) * lower)
+/// The part of −1..1 in which a x² + 2 h x + c is not positive, for a ≥ 0.
+fn least_range(a: f64, h: f64, c: f64) -> Option<[f64; 2]> {
+    if a == 0.0 {
+        return (c <= 0.0).then_some([-1.0, 1.0]);
+    }
+    let square = h * h - a * c;
+    let root = if square >= 0.0 { square.sqrt() } else { return None };
+    let (low, high) = (((-h - root) / a).max(-1.0), ((-h + root) / a).min(1.0));
+    (low <= high).then_some([low, high])
 }
 
 /// An orthonormal frame whose first axis is `along`.

@@ -1,8 +1,10 @@
 //! The descent of a scan's tree towards a shape.
 
-use fearless_simd::{Simd, f32x4};
+use std::ops::ControlFlow;
+
+use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::Tree;
+use nearmiss_hierarchy::{PlaceVisitor, Starts, Tree};
 
 use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
@@ -41,6 +43,16 @@ impl<'s, 'a> Near<'s, 'a> {
         self.most = from_core + self.lane_box.slack;
         let of_boxes = self.most + (self.elements.beyond_boxes() as f32).next_up();
         self.most_sq = (of_boxes * of_boxes).next_up();
+    }
+
+    /// Visits the leaves near the shape below some nodes, until `visitor` ends the descent.
+    pub(crate) fn descend<V: PlaceVisitor>(
+        &self,
+        level: Level,
+        starts: &Starts<'_>,
+        visitor: &mut V,
+    ) -> ControlFlow<()> {
+        self.elements.arrays.tree.descend_from(level, starts, self.lane_box.centre, visitor)
     }
 
     /// Lower bounds on the squared distances of the core from the children of a node.

@@ -38,9 +38,9 @@ pub(crate) fn distance(
     let near = Near::new(elements, solid, elements.certifies);
     let mut search = Apart { near, upper: f64::INFINITY, best: None, lower: f64::INFINITY };
     search.near.limit(within / scale);
-    let centre = search.near.lane_box.centre;
     // Ends early if they touch.
-    let _touching = elements.arrays.tree.descend_to(level, centre, &mut search);
+    let near = search.near;
+    let _touching = near.descend(level, &elements.starts(solid, within / scale), &mut search);
     let (i, gap) = search.best.filter(|_| search.upper * scale <= within)?;
     let upper = search.upper;
     let lower = match elements.semantics {

@@ -4,7 +4,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{LeafBlock, Part, SLAB, ScanArrays, THICKNESS};
+use nearmiss_hierarchy::{LeafBlock, NodeGrid, Part, SLAB, ScanArrays, Starts, THICKNESS};
 use nearmiss_lanes::wide::bits;
 
 use crate::ask::answer::Evidence;
@@ -36,6 +36,8 @@ pub(crate) enum Element {
 pub(crate) struct Elements<'a> {
     pub(crate) placed: Placed<'a>,
     pub(crate) arrays: ScanArrays<'a>,
+    /// The nodes near each place, if the scan has a shape index and the obstacle or points count.
+    pub(crate) nodes: Option<&'a NodeGrid>,
     pub(crate) plan: ShapePlan,
     pub(crate) semantics: Semantics,
     /// The margin in the stored frame.
@@ -55,16 +57,22 @@ pub(crate) struct LeafGaps {
     pub(crate) elements: [f32; WIDTH],
     /// From the volumes that contain the obstacle near the points.
     pub(crate) cells: [f32; WIDTH],
+    /// Upper bounds on the distances from the points themselves, if the core is a box, a segment or a
+    /// point.
+    pub(crate) points: [f32; WIDTH],
 }
 
 /// The sizes of the parts of sixteen points.
-struct Parts<S: Simd> {
+pub(crate) struct Parts<S: Simd> {
     /// The radii of discs and balls.
-    radii: f32x16<S>,
-    /// The radii about the points that contain the obstacle near them, and half its thickness.
-    reaches: f32x16<S>,
+    pub(crate) radii: f32x16<S>,
+    /// The radii about the points that contain the obstacle near them, and half its thickness. Not set
+    /// if only discs and balls are wanted, as the next.
+    pub(crate) reaches: f32x16<S>,
     slabs: f32x16<S>,
-    discs: mask32x16<S>,
+    /// The radii of the cells of points on sheets.
+    pub(crate) cells: f32x16<S>,
+    pub(crate) discs: mask32x16<S>,
 }
 
 impl<'a> Elements<'a> {
@@ -76,11 +84,14 @@ impl<'a> Elements<'a> {
             Semantics::Thickened(radius) => radius / scale,
             _ => 0.0,
         };
+        // The surface alone continues beyond the obstacle, in which the grid looks for nodes.
+        let is_listed = options.semantics != Semantics::Surface;
         let bounds = placed.scan().root_box();
         let far = Vector3::from(bounds.centre).amax() + bounds.radius();
         Self {
             placed,
             arrays,
+            nodes: placed.shapes().and_then(|index| index.nodes.as_deref()).filter(|_| is_listed),
             plan: *plan,
             semantics: options.semantics,
             margin: options.margin / scale,
@@ -101,6 +112,15 @@ impl<'a> Elements<'a> {
     /// The radius by which points exceed the boxes of their nodes.
     pub(crate) fn beyond_boxes(&self) -> f64 {
         self.thickened
+    }
+
+    /// The nodes that contain all points whose parts are within this distance of a shape: those that the
+    /// scan's index lists or, without one, the root.
+    #[inline]
+    pub(crate) fn starts(&self, solid: &Solid<'_>, within: f64) -> Starts<'a> {
+        let reach = within + solid.radius + self.beyond_boxes();
+        let listed = self.nodes.and_then(|nodes| nodes.near(solid.centre.into(), solid.half.norm(), reach));
+        listed.unwrap_or(Starts::ROOT)
     }
 
     pub(crate) fn position(&self, i: usize) -> Vector {
@@ -202,7 +222,8 @@ impl<'a> Elements<'a> {
         lane_box: &LaneBox,
         (leaf, block, first, count): (usize, &LeafBlock, usize, usize),
     ) -> LeafGaps {
-        let parts = self.parts(simd, leaf, (block, first, count));
+        let has_cells = self.certifies && self.semantics == Semantics::Obstacle;
+        let parts = self.parts(simd, leaf, (block, first, count), has_cells);
         let used = mask32x16::from_bitmask(simd, (1_u64 << count) - 1);
         let none = f32x16::splat(simd, f32::INFINITY);
         // Positions are off by a step, and normals by less than a step in each component.
@@ -211,7 +232,7 @@ impl<'a> Elements<'a> {
         let distances = lane_box.of_points(simd, &block.positions(simd), &block.normals(simd));
         let tilt = (distances.from_point + lane_box.reach()) * (2.0 / STEPS) + (2.0 * step + lane_box.slack);
         let elements = distances.from(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
-        let cells = if self.certifies && self.semantics == Semantics::Obstacle {
+        let cells = if has_cells {
             distances.from(simd, parts.reaches, parts.slabs, parts.discs) - tilt
         } else {
             elements
@@ -219,50 +240,52 @@ impl<'a> Elements<'a> {
         LeafGaps {
             elements: used.select(elements, none).to_array(),
             cells: used.select(cells, none).to_array(),
+            points: (distances.from_point + (2.0 * step + lane_box.slack)).to_array(),
         }
     }
 
-    /// The sizes of the parts of the points in a block.
+    /// The sizes of the parts of the points in a block of a leaf, and those of their cells.
     #[inline(always)]
-    fn parts<S: Simd>(
+    pub(crate) fn parts<S: Simd>(
         &self,
         simd: S,
         leaf: usize,
         (block, first, count): (&LeafBlock, usize, usize),
+        has_cells: bool,
     ) -> Parts<S> {
         let zero = f32x16::splat(simd, 0.0);
-        let is_whole = count == WIDTH && first.is_multiple_of(WIDTH);
-        let local: Option<&[f32; WIDTH]> =
-            self.arrays.radii.get(first..first + WIDTH).and_then(|radii| radii.try_into().ok());
-        if let Some(local) = local.filter(|_| is_whole && self.semantics == Semantics::Obstacle) {
+        if count == WIDTH && first.is_multiple_of(WIDTH) && self.semantics == Semantics::Obstacle {
             let balls = if self.arrays.leaves.has_balls(leaf) {
                 f32x16::load_array_ref(simd, &self.arrays.obstacle_balls(first / WIDTH))
             } else {
                 zero
             };
-            let discs: mask32x16<S> = balls.simd_eq(zero);
-            let (local, of_discs) = (f32x16::load_array_ref(simd, local), block.discs(simd));
-            // As `ScanArrays::obstacle_reach`, with the thickness of a disc.
-            let of_cells = local.min(0.5 * self.arrays.reach).max(of_discs * (1.0 + THICKNESS));
-            return Parts {
-                radii: discs.select(of_discs, balls),
-                reaches: discs.select(of_cells, balls),
-                slabs: local * SLAB,
-                discs,
+            let (discs, of_discs): (mask32x16<S>, _) = (balls.simd_eq(zero), block.discs(simd));
+            let radii = discs.select(of_discs, balls);
+            let local: Option<&[f32; WIDTH]> = self.arrays.radii[first..first + WIDTH].try_into().ok();
+            let Some(local) = local.filter(|_| has_cells) else {
+                return Parts { radii, reaches: radii, slabs: zero, cells: zero, discs };
             };
+            let local = f32x16::load_array_ref(simd, local);
+            let cells = local.min(0.5 * self.arrays.reach);
+            // As `ScanArrays::obstacle_reach`, with the thickness of a disc.
+            let reaches = discs.select(cells.max(of_discs * (1.0 + THICKNESS)), balls);
+            return Parts { radii, reaches, slabs: local * SLAB, cells, discs };
         }
         let (mut radii, mut reaches, mut slabs) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
-        let mut discs = 0_u64;
+        let (mut cells, mut discs) = ([0.0; WIDTH], 0_u64);
         for (lane, i) in (first..first + count).enumerate() {
             radii[lane] = self.radius(i);
             reaches[lane] = self.arrays.obstacle_reach(i);
             slabs[lane] = SLAB * self.arrays.radii[i];
+            cells[lane] = self.arrays.cell_radius(i);
             discs |= u64::from(self.is_disc(i)) << lane;
         }
         Parts {
             radii: f32x16::load_array_ref(simd, &radii),
             reaches: f32x16::load_array_ref(simd, &reaches),
             slabs: f32x16::load_array_ref(simd, &slabs),
+            cells: f32x16::load_array_ref(simd, &cells),
             discs: mask32x16::from_bitmask(simd, discs),
         }
     }
@@ -273,16 +296,6 @@ impl<'a> Elements<'a> {
         // Not `<=`, which would be false for NaN.
         let beyond: mask32x16<S> = f32x16::load_array_ref(simd, gaps).simd_gt(most);
         !bits(beyond) & ((1 << count) - 1)
-    }
-
-    /// The radius about a point within which a ray may hit it.
-    #[inline]
-    pub(crate) fn ray_reach(&self, i: usize) -> f32 {
-        if self.is_disc(i) {
-            self.arrays.obstacle_reach(i).max(self.arrays.discs.get(i))
-        } else {
-            self.radius(i)
-        }
     }
 
     /// A point in the world.

@@ -50,14 +50,21 @@ pub(crate) fn touch(
     let Some(solid) = solid else {
         return ShapeAnswer { verdict: ShapeVerdict::Undecided(Reason::Shape), band: f64::INFINITY };
     };
+    let separated = |evidence| ShapeAnswer {
+        verdict: ShapeVerdict::Separated { evidence },
+        band: elements.greatest_band(),
+    };
+    let starts = elements.starts(solid, elements.margin);
+    if starts.is_empty() {
+        return separated(elements.of_separation(false));
+    }
     let detail = elements.plan.options().detail;
     let mut near = Near::new(elements, solid, elements.certifies);
     near.limit(elements.margin);
     let (met, certified) = ([None; TRIES], None);
     let mut search = Touch { near, detail, met, count: 0, certified, undersampled: false, doubtful: false };
-    let centre = search.near.lane_box.centre;
     // An early end means that the question is settled.
-    let _settled = elements.arrays.tree.descend_to(level, centre, &mut search);
+    let _settled = near.descend(level, &starts, &mut search);
     let touching = |met: Met, point, evidence| ShapeAnswer {
         verdict: ShapeVerdict::Touching { point, source: elements.placed.scan().id(met.i), evidence },
         band: elements.band(met.i),
@@ -75,12 +82,11 @@ pub(crate) fn touch(
         }
         return touching(first, elements.in_world(&first.point), Evidence::Estimated);
     }
-    let verdict = if search.undersampled {
-        ShapeVerdict::Undecided(Reason::Undersampled)
-    } else {
-        ShapeVerdict::Separated { evidence: elements.of_separation(search.doubtful) }
-    };
-    ShapeAnswer { verdict, band: elements.greatest_band() }
+    if search.undersampled {
+        let verdict = ShapeVerdict::Undecided(Reason::Undersampled);
+        return ShapeAnswer { verdict, band: elements.greatest_band() };
+    }
+    separated(elements.of_separation(search.doubtful))
 }
 
 impl Touch<'_, '_> {
@@ -107,10 +113,17 @@ impl Touch<'_, '_> {
         if self.detail == Detail::Verdict {
             return ControlFlow::Break(());
         }
-        // A measured point is part of the obstacle.
-        let p = elements.position(i);
-        if elements.semantics == Semantics::Obstacle && solid.distance(&p) <= solid.radius + elements.margin {
-            self.certified = Some(Met { i, point: p });
+        self.hold(i)
+    }
+
+    /// Ends the search if a measured point is in the shape: points are part of the obstacle.
+    fn hold(&mut self, i: usize) -> ControlFlow<()> {
+        let Near { elements, solid, .. } = self.near;
+        let point = elements.position(i);
+        if elements.semantics == Semantics::Obstacle
+            && solid.distance(&point) <= solid.radius + elements.margin
+        {
+            self.certified = Some(Met { i, point });
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())
@@ -136,6 +149,10 @@ impl PlaceVisitor for Touch<'_, '_> {
         }
         for (block, first, count) in elements.arrays.leaves.blocks(number) {
             let gaps = elements.leaf_gaps(simd, &self.near.lane_box, (number, block, first, count));
+            if self.near.solid.is_box() {
+                let first_in = Bits(Elements::within(simd, (&gaps.points, count), self.near.most)).next();
+                first_in.map_or(ControlFlow::Continue(()), |lane| self.hold(first + lane))?;
+            }
             for lane in Bits(Elements::within(simd, (&gaps.elements, count), self.near.most)) {
                 self.compare(first + lane)?;
             }

@@ -6,7 +6,7 @@ use nearmiss_hierarchy::{BuildOptions, PointHierarchy, SLAB, THICKNESS};
 use nearmiss_mesh::nearest_on_triangle;
 use nearmiss_query::{
     CollideOptions, Detail, Evidence, Method, Placed, PlanError, Reason, Sampling, Scratch, Semantics, Shape,
-    ShapePlan, ShapeVerdict, SupportMap, Target,
+    ShapeIndex, ShapePlan, ShapeVerdict, SupportMap, Target,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::instructions::levels;
@@ -322,8 +322,10 @@ fn every_answer_is_that_of_brute_force() {
         let size = scan.bounds().half_extents().into_iter().fold(0.0, f64::max);
         let scale = [1.0, 1e-3, 1e4][(n / 3 % 3) as usize];
         let pose = rotation(rng).with_scale(scale).with_translation(point_in(rng, 3.0 * size * scale));
-        let placed = Placed::new(&scan, &pose);
+        let index = ShapeIndex::new(&scan);
         for round in 0..14 {
+            let placed = Placed::new(&scan, &pose);
+            let placed = if round % 4 < 2 { placed.with_shapes(&index) } else { placed };
             let about = placed.point(rng.random_range(0..scan.len()));
             let reach = size * scale * [0.6, 0.1, 1e-3][round % 3];
             let d = point_in(rng, reach);
@@ -345,6 +347,45 @@ fn every_answer_is_that_of_brute_force() {
         }
     }
     assert!(seen.iter().flatten().all(|&n| n > 5), "both answers of every shape: {seen:?}");
+}
+
+#[test]
+fn an_index_changes_no_verdict() {
+    let rng = &mut rng(17);
+    let mut seen = [0; 2];
+    for (n, kind) in (0_u64..).zip(CloudKind::ALL) {
+        let scan = prepared(kind, 3000, n, [16, 7][(n % 2) as usize]);
+        let (index, r) = (ShapeIndex::new(&scan), scan.sampling_radius() / scan.frame().scale);
+        let plain = Placed::new(&scan, &Pose::IDENTITY);
+        let mut points = Vec::new();
+        for round in 0..140 {
+            let about = plain.point(rng.random_range(0..scan.len()));
+            let d = point_in(rng, [1.0, 4.0, 8.0][round % 3] * r);
+            let centre = [0, 1, 2].map(|k| about[k] + d[k]);
+            let shape = draw(rng, round % 14, (centre, [0.5, 2.0][round % 2] * r), &mut points);
+            let semantics = if round % 5 == 1 { Semantics::Thickened(0.3 * r) } else { Semantics::Obstacle };
+            let options = CollideOptions::default().with_semantics(semantics).with_detail(Detail::Verdict);
+            let plan = ShapePlan::new(&options, &scan).unwrap();
+            let mut scratch = Scratch::default();
+            let [(touching, evidence, distance, depth), indexed] =
+                [plain, plain.with_shapes(&index)].map(|placed| {
+                    let (target, mut contacts) = (Target::new(placed, &plan), Vec::new());
+                    let verdict = target.touch(&shape, &mut scratch).verdict;
+                    let evidence = match verdict {
+                        ShapeVerdict::Separated { evidence } => Some(evidence),
+                        _ => None,
+                    };
+                    let distance = target.distance(&shape, 2.0 * r, &mut scratch);
+                    target.contacts(&shape, &mut contacts, &mut scratch);
+                    let depth = contacts.first().map(|contact| contact.depth);
+                    (verdict.is_touching(), evidence, distance.map(|it| [it.lower, it.upper]), depth)
+                });
+            let what = format!("{kind:?}, round {round}, {shape:?}");
+            seen[usize::from(touching)] += 1;
+            assert_eq!(indexed, (touching, evidence, distance, depth), "{what}");
+        }
+    }
+    assert!(seen.iter().all(|&n| n > 100), "both answers: {seen:?}");
 }
 
 #[test]
