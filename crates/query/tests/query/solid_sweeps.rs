@@ -149,15 +149,15 @@ fn plans_without_proof_find_the_impacts_of_all_shapes_in_a_few_steps() {
     let plan = ShapePlan::new(&CollideOptions::estimated(), &scan).unwrap();
     let target = Target::new(Placed::new(&scan, &placed), &plan);
     let half = [0.15, 0.1, 0.05];
-    let corners: Vec<[f64; 3]> = (0..8_u8)
-        .map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { -half[k] } else { half[k] }))
-        .collect();
+    let corners: Vec<[f64; 3]> =
+        (0..8_u8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { -half[k] } else { half[k] })).collect();
     let own = Corners(corners.clone());
     // A motion in the scan's own frame, moved along with the scan; rigid.
     let into = |pose: &Pose| placed.after(pose).with_scale(1.0);
     let (mut impacts, mut free, mut queries) = (0, 0, 0);
     for round in 0..60_usize {
-        let motion = Motion::through(&path(rng, round % 2 == 0).iter().map(into).collect::<Vec<_>>()).unwrap();
+        let motion =
+            Motion::through(&path(rng, round % 2 == 0).iter().map(into).collect::<Vec<_>>()).unwrap();
         let solid = Shape::Box { pose: Pose::IDENTITY, half, radius: 0.02 };
         let others = [Shape::Hull { points: &corners, radius: 0.02 }, Shape::Own { map: &own, radius: 0.02 }];
         let [of_box, of_hull, of_own] = [solid, others[0], others[1]].map(|shape| {
