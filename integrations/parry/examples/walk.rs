@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use nearmiss::io::read;
 use nearmiss::slices::{Avatar, AvatarOptions, Pixel, Route, SliceBuilder, SliceOptions, SlicePlan};
-use nearmiss::{Aabb, BuildOptions, Scan};
+use nearmiss::{Aabb, BuildOptions, PointCloud, Scan};
 use nearmiss_parry::{Character, CharacterOptions, Obstacle, ScanDispatcher, ScanShape};
 use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher as _};
 use rapier3d::prelude::*;
@@ -28,27 +28,27 @@ const SPEED: f32 = 1.4;
 const RATE: u32 = 60;
 
 /// Seconds after which the walk is given up.
-const PATIENCE: u32 = 300;
+const PATIENCE: u32 = 120;
 
 /// A point of the route is reached within this distance across.
 const NEAR: f32 = 0.1;
 
 fn main() -> Result<(), Failure> {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let [path, from, to] =
-        words.get(..3).and_then(|words| words.try_into().ok()).ok_or("give SCAN FROM TO")?;
-    let [from, to]: [[f64; 3]; 2] = [place(from)?, place(to)?];
+    let [path, from, to, ..] = words.as_slice() else { return Err("give SCAN FROM TO".into()) };
+    let [from, to] = [place(from)?, place(to)?];
     let cloud = read(path, None)?.cloud;
     let scan = Scan::build(&cloud, &BuildOptions::default())?;
     println!("{} points, sampling radius {:.3}", scan.len(), scan.sampling_radius());
-    let points: Vec<[f64; 3]> = (0..cloud.len()).map(|i| cloud.position(i)).collect();
-    let route = route(&points, [from, to], words.iter().any(|word| word == "--falls"))?;
+    let route = route(&cloud, scan.bounds(), [from, to], words.iter().any(|word| word == "--falls"))?;
     println!("a route of {} points", route.points.len());
 
     let mut world = PhysicsWorld::new();
     world.narrow_phase = NarrowPhase::with_query_dispatcher(ScanDispatcher.chain(DefaultQueryDispatcher));
     world.insert_collider(ColliderBuilder::new(ScanShape::new(scan)?.shared()), None);
-    let options = CharacterOptions { up: Vector::Z, radius: 0.2, height: 1.6, ..CharacterOptions::default() };
+    // Narrower than the avatar of the route, whose corners it turns.
+    let options =
+        CharacterOptions { up: Vector::Z, radius: 0.15, height: 1.6, ..CharacterOptions::default() };
     let mut walker = Character::new(&options, vector(from) + Vector::Z * 0.1)?;
     let shape = SharedShape::new(walker.capsule());
     let body = RigidBodyBuilder::kinematic_position_based().translation(walker.centre());
@@ -103,11 +103,11 @@ fn walk(
     "gave up"
 }
 
-/// A short route on the slice map of some points.
-fn route(points: &[[f64; 3]], ends: [[f64; 3]; 2], falls: bool) -> Result<Route, Failure> {
+/// A short route on the slice map of a cloud.
+fn route(cloud: &PointCloud, bounds: &Aabb, ends: [[f64; 3]; 2], falls: bool) -> Result<Route, Failure> {
     let options = SliceOptions::default().with_pixel(Pixel::Side(0.05));
-    let mut builder = SliceBuilder::new(&SlicePlan::new(&options, &Aabb::of(points.iter().copied()))?)?;
-    builder.add(points);
+    let mut builder = SliceBuilder::new(&SlicePlan::new(&options, bounds)?)?;
+    builder.add_cloud(cloud);
     let avatar = Avatar::new(&AvatarOptions::default())?;
     Ok(Route::find(&builder.finish(), &avatar, ends, falls)?.route)
 }
