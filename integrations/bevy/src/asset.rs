@@ -88,8 +88,8 @@ fn prepared(bytes: Vec<u8>, path: &Path, settings: &ScanSettings) -> Result<Scan
         return Ok(Scan::from_bytes(bytes, Check::Full)?);
     }
     let cloud = nearmiss::io::read_bytes(&bytes, None, path)?.cloud;
-    let options =
-        settings.reach.map_or_else(BuildOptions::default, |l| BuildOptions::default().with_reach(Some(l)));
+    let options = BuildOptions::default();
+    let options = settings.reach.map_or(options, |reach| options.with_reach(reach));
     let scan = Scan::build(&cloud, &options)?;
     Ok(if settings.graph { scan.with_graph(&cloud, &GraphOptions::default(), None)? } else { scan })
 }

@@ -51,8 +51,7 @@ impl Scans<'_, '_> {
         self.world.bodies().near_shape(&path, 0.0, near);
         let mut first: Option<(Entity, RayHit)> = None;
         for (entity, target) in near.iter().filter_map(|&body| self.world.target(body)) {
-            let rest = ray.with_max(first.map_or(ray.max, |(_, hit)| hit.t));
-            let hit = target.cast(&rest, scratch).hit;
+            let hit = target.cast(ray, scratch).hit;
             if let Some(hit) = hit.filter(|hit| first.is_none_or(|(_, first)| hit.t < first.t)) {
                 first = Some((entity, hit));
             }

@@ -208,7 +208,7 @@ fn contacts_begin_stay_and_end() {
     };
     place(&mut app, ring, above(0.39));
     assert_eq!(phases(&mut app), [ContactPhase::Began], "it is lowered");
-    assert_eq!(phases(&mut app), [], "nothing moves");
+    assert!(phases(&mut app).is_empty(), "nothing moves");
     place(&mut app, ring, above(0.38));
     assert_eq!(phases(&mut app), [ContactPhase::Stays], "it is lowered further");
     place(&mut app, ring, above(3.0));
@@ -217,9 +217,9 @@ fn contacts_begin_stay_and_end() {
     assert_eq!(phases(&mut app), [ContactPhase::Began], "it is back");
     app.world_mut().despawn(ring);
     assert_eq!(phases(&mut app), [ContactPhase::Ended], "it is gone");
-    assert_eq!(phases(&mut app), [], "and stays so");
+    assert!(phases(&mut app).is_empty(), "and stays so");
 
-    // Without draining, systems of the next frame read them.
+    // Systems of the next frame read them.
     let ring = scan_of(&points_of_torus());
     let _ring = spawn(&mut app, &ring, above(0.39));
     app.update();
