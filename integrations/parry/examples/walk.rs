@@ -114,7 +114,7 @@ fn route(cloud: &PointCloud, bounds: &Aabb, ends: [[f64; 3]; 2], falls: bool) ->
 
 fn place(word: &str) -> Result<[f64; 3], Failure> {
     let numbers: Vec<f64> = word.split(',').map(str::parse).collect::<Result<_, _>>()?;
-    Ok(numbers.try_into().map_err(|_| format!("expected a place X,Y,Z, got {word}"))?)
+    Ok(numbers.try_into().map_err(|got| format!("expected a place X,Y,Z, got {got:?}"))?)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rapier computes in single precision")]
