@@ -32,8 +32,7 @@ const TINY: Real = 1e-4;
 /// It is a capsule whose lower end, up to the height of a step, is as wide as its foot: a ball of half its
 /// radius, or more if steps are low. First the part above the height of a step moves sideways. Then the
 /// foot comes down from that height, onto whatever is there: the floor, a step, or a slope. So nothing
-/// lower than a step is in the way, no step needs a test of its own, and the noise of a scanned floor is
-/// none. The ground carries the character unless it is steeper than the greatest slope; steeper ground is
+/// lower than a step is in the way, and neither is the noise of a scanned floor. The ground carries the character unless it is steeper than the greatest slope; steeper ground is
 /// not climbed, and the character slides down on it. An edge carries it if the ground behind the edge
 /// does.
 ///
@@ -41,8 +40,7 @@ const TINY: Real = 1e-4;
 /// [`Self::centre`], and the world pushes others away. rapier's own controller asks parry about contacts,
 /// whatever dispatcher the world has, and does not see scans.
 ///
-/// Deterministic. Does not allocate. Costs some 5 to 15 shape casts for a step no longer than a step is
-/// high.
+/// Deterministic. Costs some 5 to 15 shape casts if the way is no longer than a step is high.
 ///
 /// ```
 /// use nearmiss::{BuildOptions, PointCloud, Scan};
@@ -168,8 +166,8 @@ impl Character {
     /// side. The part of `wanted` along `up` is the caller's jump or fall, for example the speed of the
     /// fall times the time of a frame.
     ///
-    /// A character on the ground that is not lifted follows the ground down by up to the snap. Not at all
-    /// moves one whose way is not finite.
+    /// A character on the ground that is not lifted follows the ground down by up to the snap. A way that
+    /// is not finite counts as none.
     pub fn step(
         &mut self,
         wanted: Vector,
