@@ -32,9 +32,9 @@ const TINY: Real = 1e-4;
 /// It is a capsule whose lower end, up to the height of a step, is as wide as its foot: a ball of half its
 /// radius, or more if steps are low. First the part above the height of a step moves sideways. Then the
 /// foot comes down from that height, onto whatever is there: the floor, a step, or a slope. So nothing
-/// lower than a step is in the way, and neither is the noise of a scanned floor. The ground carries the character unless it is steeper than the greatest slope; steeper ground is
-/// not climbed, and the character slides down on it. An edge carries it if the ground behind the edge
-/// does.
+/// lower than a step is in the way, and neither is the noise of a scanned floor. The ground carries the
+/// character unless it is steeper than the greatest slope; steeper ground is not climbed, and the
+/// character slides down on it. An edge carries it if the ground behind the edge does.
 ///
 /// It does not move bodies of a world. Give a kinematic body the shape [`Self::capsule`] and move it to
 /// [`Self::centre`], and the world pushes others away. rapier's own controller asks parry about contacts,
