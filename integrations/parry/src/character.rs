@@ -53,7 +53,8 @@ const TINY: Real = 1e-4;
 ///     .map(|i| [f64::from(i % 100) * 0.02, f64::from(i / 100) * 0.02])
 ///     .map(|[x, z]| [x, if x < 1.0 { 0.0 } else { 0.2 }, z])
 ///     .collect();
-/// let floor = ScanShape::new(Scan::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?)?;
+/// let floor = Scan::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let floor = ScanShape::new(floor)?;
 /// let obstacles = [Obstacle { pose: Pose::IDENTITY, shape: &floor }];
 ///
 /// let dispatcher = ScanDispatcher.chain(DefaultQueryDispatcher);
@@ -311,7 +312,7 @@ impl Walk<'_> {
         (share.clamp(0.0, 1.0), hit.filter(|_| share < 1.0))
     }
 
-    /// What the foot meets that comes down from the height of a step to `fall` below the feet.
+    /// The first thing that the foot meets that comes down from the height of a step to `fall` below the feet.
     fn ground(&self, feet: Vector, fall: Real) -> Option<Ground> {
         let CharacterOptions { up, step, .. } = *self.options;
         let (radius, way) = (self.foot(), step + fall);

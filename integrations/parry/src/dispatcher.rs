@@ -19,8 +19,8 @@ thread_local! {
     static TOUCHES: RefCell<Vec<Touch>> = RefCell::default();
 }
 
-/// Answers the questions of parry about [`ScanShape`](crate::ScanShape) and any other shape, or another scan, in either
-/// order. Everything else is [`Unsupported`], so that a chain asks the next dispatcher.
+/// Answers the questions of parry about [`ScanShape`](crate::ScanShape) and any other shape, or another
+/// scan, in either order. Everything else is [`Unsupported`], so that a chain asks the next dispatcher.
 ///
 /// ```
 /// use parry3d::query::{DefaultQueryDispatcher, QueryDispatcher};
