@@ -312,7 +312,7 @@ impl Walk<'_> {
         (share.clamp(0.0, 1.0), hit.filter(|_| share < 1.0))
     }
 
-    /// The first thing that the foot meets that comes down from the height of a step to `fall` below the feet.
+    /// The first contact of the foot, which comes down from the height of a step to `fall` below the feet.
     fn ground(&self, feet: Vector, fall: Real) -> Option<Ground> {
         let CharacterOptions { up, step, .. } = *self.options;
         let (radius, way) = (self.foot(), step + fall);
