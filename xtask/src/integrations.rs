@@ -1,4 +1,4 @@
-//! The libraries for C and Python: their tests, the wheel, and a folder to link with.
+//! The integrations: their tests, the wheel for Python, and a folder to link with for C.
 
 use std::fs;
 use std::io::Write;
@@ -16,11 +16,16 @@ const ROUNDING: f64 = 1e-9;
 /// Options of every C and C++ compiler.
 const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-g"];
 
-/// Builds and tests both libraries, with the artefacts of `cargo test --workspace`. Says what it
+/// The tests in Rust that take a second together; those of whole worlds are in `tests` alone.
+const QUICK: [&str; 4] = ["app", "bodies", "casts", "character"];
+
+/// Builds and tests all integrations, with the artefacts of `cargo test --workspace`. Says what it
 /// skips.
 pub(crate) fn run() -> Outcome {
     // The features, and so the artefacts, are those of the check `tests`.
     run_cargo(&["build", "--workspace", "--lib", "--tests", "--quiet"])?;
+    let quick = QUICK.iter().flat_map(|name| ["--test", name]);
+    run_cargo(&["test", "--workspace", "--quiet"].into_iter().chain(quick).collect::<Vec<_>>())?;
     let built = built("debug")?;
     let work = root().join("target").join("integrations");
     fs::create_dir_all(&work)?;

@@ -18,7 +18,7 @@ const COMMENT_WIDTH: usize = 110;
 const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 
 /// The members of the workspace that each crate may use; the table of ARCHITECTURE.md.
-const LAYERS: [(&str, &[&str]); 23] = [
+const LAYERS: [(&str, &[&str]); 24] = [
     ("nearmiss-geometry", &[]),
     ("nearmiss-lanes", &[]),
     ("nearmiss-index", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-store"]),
@@ -84,6 +84,7 @@ const LAYERS: [(&str, &[&str]); 23] = [
     ),
     ("nearmiss-cli", &["nearmiss", "nearmiss-draw"]),
     ("nearmiss-parry", &["nearmiss"]),
+    ("nearmiss-bevy", &["nearmiss"]),
     ("nearmiss-c", &["nearmiss"]),
     ("nearmiss-python", &["nearmiss"]),
     ("nearmiss-testdata", &["nearmiss-geometry"]),

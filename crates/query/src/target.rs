@@ -186,8 +186,8 @@ impl<'a> Target<'a> {
     /// the world.
     ///
     /// `Free` and `t_free` are proofs, as for two scans ([`Sweep`](crate::Sweep)); plans without
-    /// certificates prove nothing. Contacts are looked for a quarter of a local radius of travel apart
-    /// where nothing is proven. Hulls and shapes of the caller's own do not move: move the scan instead.
+    /// certificates prove nothing. Where nothing is proven, contacts are looked for as far apart as the
+    /// nearest disc or ball allows, and at least a quarter of a local radius of travel.
     ///
     /// Costs a few distance queries, more the longer the shape moves within about one local radius of
     /// the scan.

@@ -122,11 +122,21 @@ impl<'a> Placed<'a> {
     /// `None` if the shape has no support map.
     fn new(shape: &'a dyn ParryShape, pose: &'a ParryPose) -> Option<Self> {
         let map = shape.as_support_map()?;
-        let axes = [Vector::X, Vector::Y, Vector::Z].into_iter().flat_map(|axis| [axis, -axis]);
         // The mean of points of a convex shape is inside it.
-        let sum: Vector = axes.map(|axis| map.local_support_point(axis)).sum();
-        Some(Self { shape, pose, centre: from_vector(pose * (sum / 6.0)) })
+        let centre = match shape.as_convex_polyhedron() {
+            Some(hull) => mean(hull.points().iter().copied()),
+            None => {
+                let axes = [Vector::X, Vector::Y, Vector::Z].into_iter().flat_map(|axis| [axis, -axis]);
+                mean(axes.map(|axis| map.local_support_point(axis)))
+            }
+        };
+        Some(Self { shape, pose, centre: from_vector(pose * centre) })
     }
+}
+
+fn mean(points: impl Iterator<Item = Vector>) -> Vector {
+    let (sum, count) = points.fold((Vector::ZERO, 0.0_f32), |(sum, n), point| (sum + point, n + 1.0));
+    sum / count.max(1.0)
 }
 
 impl fmt::Debug for Placed<'_> {

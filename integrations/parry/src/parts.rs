@@ -32,7 +32,8 @@ pub(crate) fn for_parts(
     visit: &mut dyn FnMut(&Part<'_>),
 ) -> Result<(), Unsupported> {
     let bounds = scan.bounds();
-    let is_convex = with_convex(shape, pose, bounds, |convex| {
+    let reach = &bounds.loosened(margin.unwrap_or(0.0));
+    let is_convex = with_convex(shape, pose, reach, |convex| {
         visit(&Part { id: 0, pose: None, shape: convex, centre: None });
     });
     if is_convex.is_some() {
@@ -41,7 +42,7 @@ pub(crate) fn for_parts(
     let centre = Some(from_vector(pose * shape.compute_local_bounding_sphere().center()));
     let mut part = |id: u32, part_pose: Option<&Pose>, part: &dyn ParryShape| {
         let placed = part_pose.map_or(*pose, |inner| pose * inner);
-        with_convex(part, &placed, bounds, |convex| {
+        with_convex(part, &placed, reach, |convex| {
             visit(&Part { id, pose: part_pose.copied(), shape: convex, centre });
         });
     };

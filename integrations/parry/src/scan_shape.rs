@@ -237,9 +237,9 @@ impl ParryShape for ScanShape {
         TypedShape::Custom(self)
     }
 
-    /// Zero: the surface has no thickness.
+    /// Half the least extent of its box, as of a solid of that size.
     fn ccd_thickness(&self) -> Real {
-        0.0
+        self.0.bounds.half_extents().min_element()
     }
 
     /// As for triangle meshes.

@@ -64,7 +64,7 @@ pub enum SweepReason {
     Budget,
     /// A pose is invalid; see [`Reason::Pose`](crate::Reason).
     Pose,
-    /// The shape is invalid, or a hull or a shape of the caller's own, which do not move.
+    /// The shape is invalid.
     Shape,
     /// The metric is geodesic. Its surfaces have no enclosures, so nothing is proven.
     Geodesic,

@@ -1,9 +1,10 @@
 //! A convex shape that moves past a scan: conservative advancement (Mirtich 1996, chapter 2) on proven
-//! distances, and tests a quarter of a spacing apart where nothing is proven.
+//! distances. Where nothing is proven, it goes on with the distance of the discs and balls, by at least
+//! a quarter of a spacing.
 
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{Aabb, Motion, Screw};
+use nearmiss_geometry::{Aabb, Motion, Pose, Screw};
 
 use crate::motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepReason};
 use crate::pair::placed::ViewScratch;
@@ -23,7 +24,7 @@ const STEP: f64 = 0.8;
 /// If less than this is left of the distance, in local radii, steps are no longer proven.
 const LEFT: f64 = 0.1;
 
-/// The way between two tests where nothing is proven, in local radii.
+/// The least way between two tests where nothing is proven, in local radii.
 const TEST: f64 = 0.25;
 
 /// Halvings of the last interval before a contact.
@@ -71,8 +72,8 @@ pub(crate) fn sweep(
         Ok(Outcome::Told(verdict)) => verdict,
         Ok(Outcome::Hit { t_free, apart, t_hit }) => {
             let t_hit = course.first_touch(apart, t_hit);
-            let moved = shape.moved(&motion.at(t_hit));
-            let solid = moved.as_ref().and_then(|it| Solid::new(it, elements.placed.stored_to_world()));
+            let (moved, frame) = course.placed(t_hit);
+            let solid = Solid::new(&moved, &frame);
             contacts(elements, solid.as_ref(), None, found, (level, scratch, candidates));
             match (found.first(), course.at(t_hit)) {
                 (Some(&contact), _) => ShapeSweepVerdict::Impact { t_free, t_hit, contact },
@@ -112,11 +113,21 @@ enum Outcome {
     },
 }
 
-impl Course<'_, '_> {
+impl<'s> Course<'s, '_> {
+    /// The shape at a time, and the stored frame of the scan relative to it. Hulls and shapes of the
+    /// caller's own borrow their places, so the frame moves past them instead.
+    fn placed(&self, time: f64) -> (Shape<'s>, Pose) {
+        let (at, frame) = (self.motion.at(time), *self.elements.placed.stored_to_world());
+        match self.shape.moved(&at) {
+            Some(moved) => (moved, frame),
+            None => (*self.shape, at.inverse().after(&frame)),
+        }
+    }
+
     /// Bounds the distance at a time.
     fn at(&mut self, time: f64) -> Result<ShapeDistance, SweepReason> {
-        let moved = self.shape.moved(&self.motion.at(time)).ok_or(SweepReason::Shape)?;
-        let solid = Solid::new(&moved, self.elements.placed.stored_to_world()).ok_or(SweepReason::Shape)?;
+        let (moved, frame) = self.placed(time);
+        let solid = Solid::new(&moved, &frame).ok_or(SweepReason::Shape)?;
         self.distances += 1;
         // Without any disc or ball, nothing is known.
         distance(self.elements, Some(&solid), f64::INFINITY, self.level).ok_or(SweepReason::Near)
@@ -161,7 +172,9 @@ impl Course<'_, '_> {
                 break;
             }
             let is_near = left <= LEFT * found.band;
-            let way = if is_near { TEST * found.band } else { STEP * left };
+            // No disc or ball is nearer than the upper bound.
+            let free = STEP * (found.upper - self.clearance);
+            let way = if is_near { free.max(TEST * found.band) } else { STEP * left };
             let next = time + way / speed;
             // What is left of the proof may reach the end of the motion.
             goes_on &= proven >= duration || !is_near && (next > time || speed == 0.0);

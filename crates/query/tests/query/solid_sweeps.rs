@@ -4,7 +4,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Motion, PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    CollideOptions, Placed, Scratch, Shape, ShapePlan, ShapeSweepVerdict, SweepReason, Target,
+    CollideOptions, Placed, Scratch, Shape, ShapePlan, ShapeSweepVerdict, SupportMap, SweepReason, Target,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::shapes::{self, Order, Sampling};
@@ -123,6 +123,85 @@ fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
     assert!(queries < 80 * 40, "{queries} distance queries");
 }
 
+/// A solid box, known by its support map.
+#[derive(Debug)]
+struct Corners(Vec<[f64; 3]>);
+
+impl SupportMap for Corners {
+    fn support(&self, direction: [f64; 3]) -> [f64; 3] {
+        let along = |p: &[f64; 3]| Vector::from(*p).dot(&Vector::from(direction));
+        *self.0.iter().max_by(|a, b| along(a).total_cmp(&along(b))).expect("corners")
+    }
+
+    fn centre(&self) -> [f64; 3] {
+        [0.0; 3]
+    }
+}
+
+#[test]
+fn plans_without_proof_find_the_impacts_of_all_shapes_in_a_few_steps() {
+    let sampled =
+        shapes::torus(1.0, 0.4).sample(Sampling { spacing: 0.05, noise: 0.0, order: Order::Random, seed: 2 });
+    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
+    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let (r, rng, mut scratch) = (scan.sampling_radius(), &mut rng(5), Scratch::default());
+    let placed = rotation(rng).with_translation([3.0, -1.0, 2.0]).with_scale(1.5);
+    let plan = ShapePlan::new(&CollideOptions::estimated(), &scan).unwrap();
+    let target = Target::new(Placed::new(&scan, &placed), &plan);
+    let half = [0.15, 0.1, 0.05];
+    let corners: Vec<[f64; 3]> =
+        (0..8_u8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { -half[k] } else { half[k] })).collect();
+    let own = Corners(corners.clone());
+    // A motion in the scan's own frame, moved along with the scan; rigid.
+    let into = |pose: &Pose| placed.after(pose).with_scale(1.0);
+    let (mut impacts, mut free, mut queries) = (0, 0, 0);
+    for round in 0..60_usize {
+        let motion =
+            Motion::through(&path(rng, round % 2 == 0).iter().map(into).collect::<Vec<_>>()).unwrap();
+        let solid = Shape::Box { pose: Pose::IDENTITY, half, radius: 0.02 };
+        let others = [Shape::Hull { points: &corners, radius: 0.02 }, Shape::Own { map: &own, radius: 0.02 }];
+        let [of_box, of_hull, of_own] = [solid, others[0], others[1]].map(|shape| {
+            let answer = target.sweep(&shape, &motion, &mut scratch);
+            queries += answer.distances;
+            match answer.verdict {
+                ShapeSweepVerdict::Impact { t_hit, contact, .. } => Some((t_hit, contact)),
+                ShapeSweepVerdict::Undecided { .. } => None,
+                ShapeSweepVerdict::Free { .. } => panic!("nothing is proven"),
+            }
+        });
+        let speed = 1.5 * 4.0;
+        for other in [of_hull, of_own] {
+            let (a, b) = (of_box.map(|it| it.0), other.map(|it| it.0));
+            assert_eq!(a.is_some(), b.is_some(), "box {a:?}, other {b:?} in round {round}");
+            let away = a.zip(b).map_or(0.0, |(a, b)| (a - b).abs() * speed);
+            assert!(away < 0.5 * r, "box {a:?}, other {b:?} in round {round}");
+            let off = other.filter(|it| it.0 > 0.0).map(|it| {
+                let foot = placed.apply_inverse(it.1.point);
+                (off_the_torus(foot.into()), it.1.depth)
+            });
+            assert!(off.is_none_or(|(off, depth)| off.abs() < 0.5 * r && depth.abs() < r), "{off:?}, r {r}");
+        }
+        // Brute force.
+        let touches = |time: f64| {
+            let moved = solid.moved(&motion.at(time)).unwrap();
+            target.touch(&moved, &mut Scratch::default()).verdict.is_touching()
+        };
+        let first = (0..=1000_u32).map(|i| f64::from(i) * 0.002).find(|&t| touches(t));
+        match (first, of_box) {
+            (Some(first), Some((t_hit, _))) => {
+                assert!(t_hit <= first && (first - t_hit) * speed < 0.5 * r, "{t_hit}, brute force {first}");
+                impacts += 1;
+            }
+            (Some(first), None) => panic!("touches at {first}, but no impact in round {round}"),
+            // Between two of the times of brute force.
+            (None, Some((t_hit, _))) => assert!(touches(t_hit), "no contact at {t_hit} in round {round}"),
+            (None, None) => free += 1,
+        }
+    }
+    assert!(impacts > 15 && free > 15, "{impacts} impacts, {free} free");
+    assert!(queries < 3 * 60 * 30, "{queries} distance queries");
+}
+
 #[test]
 fn shapes_that_do_not_move_or_start_in_contact_are_told() {
     let sampled =
@@ -143,9 +222,9 @@ fn shapes_that_do_not_move_or_start_in_contact_are_told() {
         panic!("in the floor");
     };
     assert_eq!((t_free, t_hit), (0.0, 0.0), "in contact from the start");
-    let hull = Shape::Hull { points: &[[0.0; 3]], radius: 0.1 };
+    let empty = Shape::Hull { points: &[], radius: 0.1 };
     let wrong = Shape::Sphere { centre: [0.0; 3], radius: -1.0 };
-    for shape in [hull, wrong] {
+    for shape in [empty, wrong] {
         let verdict = told(&shape, &still(0.5));
         let reason = SweepReason::Shape;
         assert_eq!(verdict, ShapeSweepVerdict::Undecided { t_free: 0.0, reason }, "{shape:?}");

@@ -1,7 +1,8 @@
 //! Two hundred bodies fall onto a scan: `cargo run --release -p nearmiss-parry --example drop -- SCAN.nm
-//! [PICTURE.png]`. The scan is in metres, z up. Without one, the scan is that of a small house.
+//! [PICTURE.png]`. The scan is in metres, z up. `-` in place of a scan is the scan of a small house.
 //!
-//! Prints energy, depths and the time of a step; draws the scene after 0, 0.5, 2 and 10 seconds.
+//! Prints energy, depths and the time of a step. Draws the scene after 0, 0.5, 2 and 10 seconds, and the
+//! energy over time as `PICTURE.svg`.
 
 #![expect(
     clippy::print_stdout,
@@ -9,11 +10,13 @@
     reason = "a program may print and read the clock"
 )]
 
+mod energy;
 mod picture;
 mod world;
 
 use std::fs::File;
 use std::io::BufWriter;
+use std::path::Path;
 use std::time::Instant;
 
 use nearmiss::geometry::PointCloud;
@@ -39,7 +42,7 @@ const SHOWN: [u32; 4] = [0, 30, 120, 600];
 fn main() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1);
     let quads = house();
-    let path = words.next();
+    let path = words.next().filter(|path| path != "-");
     let scan = match &path {
         Some(path) => Scan::open(path, Check::Full)?,
         None => {
@@ -49,15 +52,18 @@ fn main() -> Result<(), Failure> {
     };
     let places = places(&scan, 200)?;
     println!("{} points, {} bodies, sampling radius {:.3}", scan.len(), places.len(), scan.sampling_radius());
-    let strip = fall(&scan, ScanShape::new(scan.clone())?.shared(), &places)?;
+    let (strip, energy) = fall(&scan, ScanShape::new(scan.clone())?.shared(), &places)?;
+    let mut records = vec![energy::Record { name: "on the scan", steps: energy }];
     if path.is_none() {
         let exact = mesh(&quads)?;
         println!("the same on a mesh of {} triangles", exact.indices().len());
-        fall(&scan, SharedShape::new(exact), &places)?;
+        let (_, energy) = fall(&scan, SharedShape::new(exact), &places)?;
+        records.push(energy::Record { name: "on the mesh", steps: energy });
     }
     if let Some(path) = words.next() {
         let picture = picture::strip(&scan, &strip);
-        picture.encode(BufWriter::new(File::create(path)?))?;
+        picture.encode(BufWriter::new(File::create(&path)?))?;
+        energy::plot(&records, &Path::new(&path).with_extension("svg"))?;
     }
     Ok(())
 }
@@ -83,19 +89,22 @@ fn mesh(quads: &[Quad]) -> Result<TriMesh, Failure> {
     Ok(TriMesh::new(vertices, triangles)?)
 }
 
-/// Lets bodies fall for ten seconds, and prints what becomes of them. Returns where they are when they
-/// are drawn.
-fn fall(scan: &Scan, ground: SharedShape, places: &[[f32; 3]]) -> Result<Vec<(f64, Vec<Vector>)>, Failure> {
+/// Where the bodies are when they are drawn, and the energy of each step.
+type Fallen = (Vec<(f64, Vec<Vector>)>, Vec<[f64; 2]>);
+
+/// Lets bodies fall for ten seconds, and prints what becomes of them.
+fn fall(scan: &Scan, ground: SharedShape, places: &[[f32; 3]]) -> Result<Fallen, Failure> {
     let mut drop = Drop::new(ground, places, 11);
     println!("seconds, kinetic J, kinetic and potential J, deepest contact, fastest, lost, ms a step");
-    let mut strip = Vec::new();
+    let (mut strip, mut energy) = (Vec::new(), Vec::new());
     let mut took = 0.0;
     for step in 0..=600 {
         if SHOWN.contains(&step) {
             strip.push((f64::from(step) / 60.0, drop.positions()));
         }
+        let [kinetic, potential] = drop.energy();
+        energy.push([kinetic, potential]);
         if step % 60 == 0 {
-            let [kinetic, potential] = drop.energy();
             let fastest = drop.speeds().into_iter().fold(0.0, f32::max);
             let lost = lost(scan, &drop)?;
             let (second, total, mean) = (step / 60, kinetic + potential, took / 60.0);
@@ -107,7 +116,7 @@ fn fall(scan: &Scan, ground: SharedShape, places: &[[f32; 3]]) -> Result<Vec<(f6
         drop.world.step();
         took += clock.elapsed().as_secs_f64() * 1000.0;
     }
-    Ok(strip)
+    Ok((strip, energy))
 }
 
 /// Free places above points of the scan that look up, from a fixed seed.
