@@ -210,9 +210,8 @@ pub(crate) fn read(path: &Path, format: Option<Format>, console: Console) -> Res
         let count = count.clone();
         #[expect(clippy::cast_precision_loss, reason = "a rough figure")]
         // Files that are read as a whole tell nothing until the end.
-        let share = move |count: u64| {
-            expected.filter(|_| count > 0).map(|expected| count as f64 / expected as f64)
-        };
+        let share =
+            move |count: u64| expected.filter(|_| count > 0).map(|expected| count as f64 / expected as f64);
         move || Told { share: share(count.get()), count: count.get(), may_end_early: false }
     });
     Ok(nearmiss::io::read_watched(path, format, &mut |points| count.add(points as u64))?)

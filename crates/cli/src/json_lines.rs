@@ -56,6 +56,7 @@ impl JsonLines {
 /// Returns the fault in a line of JSON, after its column if that is known.
 pub(crate) fn json_fault(cause: &serde_json::Error) -> String {
     let message = cause.to_string();
-    let what = message.split(" at line ").next().unwrap_or_default().replace("expected f64", "expected a number");
+    let what =
+        message.split(" at line ").next().unwrap_or_default().replace("expected f64", "expected a number");
     if cause.column() > 0 { format!("column {}: {what}", cause.column()) } else { what }
 }

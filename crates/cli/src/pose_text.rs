@@ -117,7 +117,9 @@ impl PoseFormat {
         let is_json = line.starts_with(['{', '[']);
         match self {
             Self::Json if is_json => json(line),
-            Self::Json => Err(format!("expected JSON as on the first line, got `{}`; {FILE_FORMS}", excerpt(line))),
+            Self::Json => {
+                Err(format!("expected JSON as on the first line, got `{}`; {FILE_FORMS}", excerpt(line)))
+            }
             _ if is_json => Err(format!("expected numbers as on the first line, got JSON; {FILE_FORMS}")),
             Self::Numbers(count) => {
                 let numbers = numbers(line)?;

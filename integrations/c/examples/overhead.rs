@@ -70,7 +70,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             times[0].push(time(|| {
                 // The same numbers as from C: a position and a quaternion of either scan.
                 let [a, b] = std::hint::black_box([&a.pose, &b.pose]);
-                let [a, b] = [a, b].map(|pose| Pose::new(pose.translation, pose.rotation).with_scale(pose.scale));
+                let [a, b] =
+                    [a, b].map(|pose| Pose::new(pose.translation, pose.rotation).with_scale(pose.scale));
                 let pair = Pair::new(scan.at(&a), scan.at(&b));
                 std::hint::black_box(pair.collide(&plan, &mut scratch));
             }));

@@ -91,8 +91,7 @@ impl AnswerRecord {
 
     /// An answer about two meshes, which is exact unless it is undecided. Sources are triangles.
     pub(crate) fn of_meshes(answer: &nearmiss::MeshAnswer) -> Self {
-        let mut record =
-            Self { likelihood: answer.likelihood, ..Self::new(&nearmiss::Answer::UNASKED) };
+        let mut record = Self { likelihood: answer.likelihood, ..Self::new(&nearmiss::Answer::UNASKED) };
         (record.band, record.reason) = (0.0, 0);
         let statistics = answer.statistics;
         (record.node_pairs, record.leaf_pairs) = (statistics.node_pairs, statistics.leaf_pairs);
@@ -100,7 +99,8 @@ impl AnswerRecord {
             MeshVerdict::Intersecting(contact) => {
                 let best = MeshContactRecord::new(&contact);
                 (record.verdict, record.evidence, record.residual) = (1, 1, 0.0);
-                (record.witness, record.normal_a, record.normal_b) = (best.point, best.normal_a, best.normal_b);
+                (record.witness, record.normal_a, record.normal_b) =
+                    (best.point, best.normal_a, best.normal_b);
                 (record.source_a, record.source_b) = (best.triangle_a, best.triangle_b);
             }
             MeshVerdict::Separated => (record.verdict, record.evidence, record.gap) = (0, 1, 0.0),

@@ -107,7 +107,8 @@ pub(crate) fn corners(given: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
         return Err(refused(format!("expected {EXPECTED}, got numbers that are no integers")));
     }
     let array = array.call_method1("astype", ("int64",))?;
-    let array = array.extract::<PyReadonlyArray2<'_, i64>>().map_err(|_shape| wrong_shape(EXPECTED, given))?;
+    let array =
+        array.extract::<PyReadonlyArray2<'_, i64>>().map_err(|_shape| wrong_shape(EXPECTED, given))?;
     if array.shape()[1] != 3 {
         return Err(wrong_shape(EXPECTED, given));
     }

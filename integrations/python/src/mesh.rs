@@ -57,7 +57,7 @@ enum Contact<'a> {
 /// A question about distance, with its options.
 enum Apart<'a> {
     Meshes(&'a Prepared, Options),
-    MeshAndScan(&'a nearmiss::Scan, DistancePlan, Options),
+    MeshAndScan(&'a nearmiss::Scan, Box<DistancePlan>, Options),
 }
 
 impl Mesh {
@@ -106,11 +106,7 @@ impl Mesh {
         }
     }
 
-    fn apart<'a>(
-        &'a self,
-        other: &'a Other<'_>,
-        options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Apart<'a>> {
+    fn apart<'a>(&'a self, other: &'a Other<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Apart<'a>> {
         match other {
             Other::Mesh(mesh) => {
                 let options = Options::of_metric(options, OF_BUDGET, nearmiss::Metric::Euclidean)?;
@@ -123,7 +119,7 @@ impl Mesh {
                     .with_semantics(options.collide.semantics)
                     .with_relative(options.relative);
                 let plan = DistancePlan::against_mesh(&asked, scan).map_err(refused)?;
-                Ok(Apart::MeshAndScan(scan, plan, options))
+                Ok(Apart::MeshAndScan(scan, Box::new(plan), options))
             }
         }
     }
@@ -165,7 +161,8 @@ impl Mesh {
     #[new]
     #[pyo3(signature = (vertices, triangles, *, weld = 0.0))]
     fn new(vertices: &Bound<'_, PyAny>, triangles: &Bound<'_, PyAny>, weld: f64) -> PyResult<Self> {
-        let mesh = TriangleMesh::new(Points::new(vertices)?.to_doubles()?, corners(triangles)?).map_err(refused)?;
+        let mesh =
+            TriangleMesh::new(Points::new(vertices)?.to_doubles()?, corners(triangles)?).map_err(refused)?;
         Self::build(vertices.py(), &mesh, weld)
     }
 

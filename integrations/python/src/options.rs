@@ -50,8 +50,13 @@ impl Options {
         names: &[&str],
         metric: Metric,
     ) -> PyResult<Self> {
-        let mut options =
-            Self { collide: CollideOptions::default(), relative: 0.1, quality: None, work: None, seconds: None };
+        let mut options = Self {
+            collide: CollideOptions::default(),
+            relative: 0.1,
+            quality: None,
+            work: None,
+            seconds: None,
+        };
         if metric == Metric::Geodesic {
             options.collide = options.collide.with_semantics(Semantics::Surface);
         }

@@ -104,7 +104,10 @@ impl<'py> Poses<'py> {
 
 /// Returns the pose that a matrix is for `thing`, as the command line does: the nearest rotation with
 /// uniform scale, refused if that moves the bounds by more than their tolerance.
-pub(crate) fn pose_of(matrix: &Matrix, thing: &(impl Placeable + ?Sized)) -> Result<Pose, nearmiss::PoseError> {
+pub(crate) fn pose_of(
+    matrix: &Matrix,
+    thing: &(impl Placeable + ?Sized),
+) -> Result<Pose, nearmiss::PoseError> {
     // Rounding alone never moves the bounds so far, and is tested in a tenth of the time.
     Pose::from_matrix(matrix).or_else(|_| {
         let [x, y, z] = [0, 1, 2].map(|i| [matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]]);
@@ -136,7 +139,9 @@ impl<'a> PosePairs<'a> {
         let matrices = [poses[0].matrices()?, poses[1].matrices()?];
         let [a, b] = matrices.map(<[Matrix]>::len);
         if a != b && a != 1 && b != 1 {
-            return Err(refused(format!("expected as many poses of both, or one pose for all, got {a} and {b}")));
+            return Err(refused(format!(
+                "expected as many poses of both, or one pose for all, got {a} and {b}"
+            )));
         }
         Ok(Self { matrices, things })
     }

@@ -3,17 +3,19 @@
 use std::path::PathBuf;
 
 use nearmiss::{
-    Check, ClashOptions, ClashPlan, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, DistanceOptions, DistancePlan, Pair, Pose,
-    Scan as Prepared,
+    Check, ClashOptions, ClashPlan, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, DistanceOptions,
+    DistancePlan, Pair, Pose, Scan as Prepared,
 };
 use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
-use crate::answers::{Answer, AnswerRecord, ClashRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord};
-use crate::each::{each_answer, each_distance};
+use crate::answers::{
+    Answer, AnswerRecord, ClashRecord, ContactRecord, Distance, DistanceRecord, ManifoldRecord,
+};
 use crate::arrays::Points;
 use crate::cloud::rows;
+use crate::each::{each_answer, each_distance};
 use crate::failure::{refused, unloadable, unreadable, unwritable};
 use crate::hint::{Hint, busy};
 use crate::options::{OF_DISTANCE, OF_MEANING, OF_SCANS, OF_SHAPES, Options};
@@ -396,9 +398,8 @@ impl Scan {
     ) -> PyResult<Bound<'py, PyAny>> {
         let (py, other) = (other.py(), other.get());
         let options = Options::new(options, OF_MEANING, &self.0)?;
-        let asked = ClashOptions::default()
-            .with_clearance(clearance)
-            .with_semantics(options.collide.semantics);
+        let asked =
+            ClashOptions::default().with_clearance(clearance).with_semantics(options.collide.semantics);
         let asked = link.map_or(asked, |link| asked.with_link(link));
         let plan = ClashPlan::new(&asked, &self.0, &other.0).map_err(refused)?;
         let [a, b] = self.both(other, pose, own_pose)?;

@@ -9,8 +9,8 @@
 use std::hint::black_box;
 
 use nearmiss::{
-    BuildOptions, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Pair, PairHint, Pose,
-    Scan, Scratch,
+    BuildOptions, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Pair,
+    PairHint, Pose, Scan, Scratch,
 };
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::in_scan::{FAR, Score, Truth, truths};

@@ -8,8 +8,8 @@ use nearmiss_draw::picture::Picture;
 use crate::clash::list::List;
 use crate::console::Bar;
 use crate::picture::{
-    GROUND, HALO, LARGEST, OF_A, OF_B, PANEL_GROUND, directions, dot, obstacle, paint_sized, scale_bar, splat,
-    stored_index,
+    GROUND, HALO, LARGEST, OF_A, OF_B, PANEL_GROUND, directions, dot, obstacle, paint_sized, scale_bar,
+    splat, stored_index,
 };
 use crate::viewpoint::whole_camera;
 

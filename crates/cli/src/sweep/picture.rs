@@ -14,8 +14,8 @@ use super::report::time;
 use crate::digits::short;
 use crate::path_plot::ticks;
 use crate::picture::{
-    GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, SMALL, Style, dot, half_diagonal, paint_sized,
-    sample as sample_of, scale_bar_in, splat,
+    GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, SMALL, Style, dot, half_diagonal,
+    paint_sized, sample as sample_of, scale_bar_in, splat,
 };
 
 /// The number of intervals at whose ends the clearance is measured.
@@ -242,7 +242,12 @@ fn inset(canvas: &mut Canvas, area: Area, (a, b): (&Placed<'_>, &Placed<'_>), wa
         width: INSET,
         height: INSET,
     };
-    let border = Area { left: area.left - FINE, top: area.top - FINE, width: INSET + 2 * FINE, height: INSET + 2 * FINE };
+    let border = Area {
+        left: area.left - FINE,
+        top: area.top - FINE,
+        width: INSET + 2 * FINE,
+        height: INSET + 2 * FINE,
+    };
     canvas.fill(border, INK);
     canvas.fill(area, PANEL_GROUND);
     let camera = style.view.camera([a, b], area, &[], |_, _| 0.0);

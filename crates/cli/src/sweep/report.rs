@@ -114,11 +114,17 @@ impl Report {
             SweepVerdict::Free { clearance, upper, at } => {
                 let kept = match clearance > 0.0 {
                     // Rounding must not seem to fall short of what was asked.
-                    true if wanted > 0.0 && clearance < wanted + unit => format!("at least {}", short(wanted)),
+                    true if wanted > 0.0 && clearance < wanted + unit => {
+                        format!("at least {}", short(wanted))
+                    }
                     true => format!("at least {}", rounded_down(clearance, unit)),
                     false => "more than 0".to_owned(),
                 };
-                let wanted = if wanted > 0.0 { format!(" with the clearance of {}", short(wanted)) } else { String::new() };
+                let wanted = if wanted > 0.0 {
+                    format!(" with the clearance of {}", short(wanted))
+                } else {
+                    String::new()
+                };
                 format!(
                     "The whole motion is free{wanted} (certified): the distance is always {kept}. The least measured is at \
                      most {}, at t = {}.",

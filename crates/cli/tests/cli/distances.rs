@@ -23,7 +23,10 @@ fn two_spheres_are_as_far_apart_as_they_are() {
 
     let people = place.ok(&asked[..5]).results;
     assert!(people.starts_with("They are between 0.9") && people.contains(" and 1.0"), "{people}");
-    assert!(people.contains(" apart (certified); the scans themselves are known to their local spacing of 0."), "{people}");
+    assert!(
+        people.contains(" apart (certified); the scans themselves are known to their local spacing of 0."),
+        "{people}"
+    );
     let band = told["band"].as_f64().unwrap();
     assert!((0.05..0.15).contains(&band), "a spacing of 0.05: {told}");
     let thick = [&asked[..], &["--thickened", "0.25"]].concat();

@@ -72,7 +72,10 @@ fn what_is_no_shape_is_refused_with_its_line() {
         ),
         ("sphere", &["line 2", "expected an object in {}"]),
         (r#"{"type":"sphere","radius":1}"#, &["line 2", "as the key, got `type`", r#"{"sphere":"#]),
-        (r#"{"box":{"pose":[0,0,0,1],"half":[1,1,1]}}"#, &["line 2", "`pose`", "7 (x y z qx qy qz qw), got 4"]),
+        (
+            r#"{"box":{"pose":[0,0,0,1],"half":[1,1,1]}}"#,
+            &["line 2", "`pose`", "7 (x y z qx qy qz qw), got 4"],
+        ),
         (r#"{"sphere":{"centre":[0,0,0],"radius":"big"}}"#, &["line 2", "expected a number"]),
     ] {
         place.write("shapes.jsonl", format!("{good}\n{line}\n"));

@@ -2,7 +2,6 @@
 
 use nearmiss_geometry::Aabb;
 
-use crate::ask::budget::Budget;
 use crate::distance::DistancePlan;
 use crate::many::body::BodyPair;
 use crate::many::world::{Bodies, BodyId, World};
@@ -35,7 +34,7 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
     /// ```
     /// use nearmiss_geometry::{PointCloud, Pose};
     /// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-    /// use nearmiss_query::{Bodies, Budget, DistanceOptions, DistancePlan, Scratch, World};
+    /// use nearmiss_query::{Bodies, DistanceOptions, DistancePlan, Scratch, World};
     ///
     /// let points: Vec<[f32; 3]> =
     ///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
@@ -46,7 +45,7 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
     /// let plan = DistancePlan::new(&DistanceOptions::default(), &plate, &plate)?;
     /// let (all, scratch) = (Bodies::All, &mut Scratch::default());
     /// let ask = |counts: fn(_, _) -> bool, scratch: &mut Scratch| {
-    ///     world.nearest_pair(all, f64::INFINITY, counts, &plan, &Budget::UNLIMITED, scratch)
+    ///     world.nearest_pair(all, f64::INFINITY, counts, &plan, scratch)
     /// };
     /// let nearest = ask(|_, _| true, scratch).expect("three pairs");
     /// assert_eq!(nearest.ids, [ids[1], ids[2]]);
@@ -60,7 +59,6 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
         reach: f64,
         mut counts: impl FnMut(BodyId, BodyId) -> bool,
         plan: &DistancePlan,
-        budget: &Budget,
         scratch: &mut Scratch,
     ) -> Option<NearestPair> {
         let mut pairs = Vec::new();
@@ -74,7 +72,7 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
                 break;
             }
             let Some(pair) = self.body_pair(ids) else { continue };
-            let (lower, upper, points) = distance(&pair.within(budget), plan, scratch);
+            let (lower, upper, points) = distance(&pair, plan, scratch);
             if !upper.is_finite() {
                 continue;
             }

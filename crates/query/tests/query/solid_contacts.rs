@@ -343,7 +343,10 @@ fn what_touches_has_contacts_no_further_than_the_margin() {
             let shapes = [
                 Shape::Sphere { centre: at, radius: 0.5 * r },
                 Shape::Capsule { ends: [at, to], radius: 0.0 },
-                Shape::Capsule { ends: [at, [0, 1, 2].map(|k| at[k] + 0.1 * (to[k] - at[k]))], radius: 0.2 * r },
+                Shape::Capsule {
+                    ends: [at, [0, 1, 2].map(|k| at[k] + 0.1 * (to[k] - at[k]))],
+                    radius: 0.2 * r,
+                },
             ];
             for shape in shapes {
                 target.contacts(&shape, &mut contacts, scratch);

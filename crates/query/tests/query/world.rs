@@ -5,8 +5,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, Bodies, BodyId, Budget, CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Evidence, Pair, Placed, Reason, Scratch, Semantics,
-    Shape, Verdict, World,
+    Answer, Bodies, BodyId, CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Evidence, Pair,
+    Placed, Reason, Scratch, Semantics, Shape, Verdict, World,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use proptest::prelude::*;
@@ -408,15 +408,15 @@ fn the_nearest_pair_is_that_of_all_pairs() {
         let placed: Bodied = (0..6)
             .map(|k| {
                 let scan = usize::try_from((seed + k) % 4).unwrap();
-                let pose = if k == 5 { hostile_pose(seed) } else { proper_pose(scan, 3 * (7 * seed + k) + 1) };
+                let pose =
+                    if k == 5 { hostile_pose(seed) } else { proper_pose(scan, 3 * (7 * seed + k) + 1) };
                 (world.insert(&SCANS[scan], &pose), scan, pose)
             })
             .collect();
         // Neighbours do not count, as along the arm of a robot.
         let counts = |a: BodyId, b: BodyId| a.0.abs_diff(b.0) > 1;
         let reach = if seed % 3 == 0 { 2.0 } else { f64::INFINITY };
-        let budget = &Budget::UNLIMITED;
-        let nearest = world.nearest_pair(Bodies::All, reach, counts, &plan, budget, &mut scratch);
+        let nearest = world.nearest_pair(Bodies::All, reach, counts, &plan, &mut scratch);
         let mut expected: Option<([BodyId; 2], f64, f64)> = None;
         let view = |k: usize| Placed::new(&SCANS[placed[k].1], &placed[k].2);
         for (i, j) in (0..6).flat_map(|i| (i + 2..6).map(move |j| (i, j))) {
