@@ -30,8 +30,8 @@ pub struct CollideArgs {
     pub first: bool,
     /// Distances that define the surfaces; by default those that the scans were prepared for
     ///
-    /// Raw inputs are prepared for the kernel given here. With the geodesic kernel, surfaces alone are compared
-    /// and separations are estimated.
+    /// Raw inputs are prepared for the kernel given here. With the geodesic kernel, surfaces alone are
+    /// compared and separations are estimated.
     #[arg(long, value_enum, conflicts_with = "thickened", help_heading = "Research", hide_short_help = true)]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans

@@ -32,7 +32,7 @@ pub(crate) struct Mesh {
     solid: OnceLock<MeshSolid>,
 }
 
-/// What a mesh is compared with.
+/// The thing that a mesh is compared with.
 #[derive(FromPyObject)]
 enum Other<'py> {
     Mesh(Bound<'py, Mesh>),
@@ -237,8 +237,8 @@ impl Mesh {
     ///
     /// Poses have shape (4, 4); the default is the identity. Options for two meshes: `p_min` and
     /// `k_min` (stop once `k_min` pairs of nodes, by default 3, are likely to collide with this
-    /// probability), `work` and `seconds`; for a scan those of `Scan.collide`. Returns an Answer, in which the
-    /// source of a mesh is the index of a triangle.
+    /// probability), `work` and `seconds`; for a scan those of `Scan.collide`. Returns an Answer, in
+    /// which the source of a mesh is the index of a triangle.
     #[pyo3(signature = (other, pose = None, own_pose = None, **options))]
     fn collide(
         &self,
