@@ -224,7 +224,7 @@ fn contacts_begin_stay_and_end() {
     let _ring = spawn(&mut app, &ring, above(0.39));
     app.update();
     app.update();
-    assert_eq!(app.world().resource::<Heard>().0, 1, "one contact is heard once");
+    assert_eq!(app.world().resource::<Heard>().0, 1, "a system reads each message once");
 }
 
 #[test]

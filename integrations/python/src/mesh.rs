@@ -270,7 +270,7 @@ impl Mesh {
 
     /// Measure the distance of this mesh, at `own_pose`, and `other`, at `pose`: a Mesh or a Scan.
     ///
-    /// That of two meshes is exact: both bounds are equal, unless `work` or `seconds` end the search.
+    /// The distance of two meshes is exact: both bounds are equal, unless `work` or `seconds` end the search.
     /// Options for a scan are those of `Scan.distance`. Returns a Distance, in which the source of a
     /// mesh is the index of a triangle.
     #[pyo3(signature = (other, pose = None, own_pose = None, **options))]

@@ -243,7 +243,7 @@ impl Gather<'_, '_> {
                 } else {
                     gap().and_then(|gap| of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)))
                 };
-                // What is over the disc may be far above it, and the rest of the shape beside it.
+                // The part of the shape over the disc may be far above it, while another part is at the rim.
                 let least = -elements.margin.max(f64::from(THICKNESS) * disc.radius);
                 let place = place.filter(|it| it.2 >= least);
                 is_beside = place.is_none();
