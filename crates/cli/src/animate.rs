@@ -30,7 +30,7 @@ use nearmiss::Renewal;
 /// Options of `animate`.
 #[derive(Debug, Clone, Args)]
 pub struct AnimateArgs {
-    /// Frames, one file each: a mesh if the first one has faces, otherwise a scan
+    /// Frames, one file each: meshes if the first file has faces, otherwise scans
     ///
     /// All frames have the same number of vertices or points, in the same order. Later frames of a
     /// mesh may be files without faces. Files are a second apart.
@@ -38,23 +38,23 @@ pub struct AnimateArgs {
     pub frames: Vec<PathBuf>,
     /// Test against this scan or mesh: prepared (.nm), or a file, which is prepared on the fly
     ///
-    /// Without --against and --against-frames, a mesh is tested against itself, and a scan is moved
-    /// without a test.
+    /// Without --against and --against-frames, a mesh is tested against itself; a scan is only moved,
+    /// not tested.
     #[arg(long, value_name = "SCAN", conflicts_with = "against_frames")]
     pub against: Option<PathBuf>,
-    /// Test against these frames, as many as the others
+    /// Test against these frames; their number must be that of <FRAMES>
     #[arg(long, value_name = "F", num_args = 1..)]
     pub against_frames: Vec<PathBuf>,
-    /// How bounds follow the motion
+    /// Method by which bounding volumes follow the motion
     #[arg(long, value_enum, default_value_t = AnimateMethod::Auto)]
     pub method: AnimateMethod,
-    /// Number of query times a second; between two files, positions are interpolated linearly
+    /// Queries per second; between two files, positions are interpolated linearly
     #[arg(long, value_name = "HZ", default_value_t = 1.0, allow_hyphen_values = true, value_parser = parse_rate)]
     pub rate: f64,
     /// Threads; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
     pub threads: Option<usize>,
-    /// Check a prepared --against in full before use: checksums, and every number
+    /// Check a prepared scan or mesh of --against in full before use: checksums and all values
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
     /// Draw the bodies at up to eight query times, coloured by their clearance, as PNG
@@ -63,7 +63,7 @@ pub struct AnimateArgs {
     /// From where the pictures are taken
     #[command(flatten)]
     pub view: ViewArgs,
-    /// Write a page with these pictures, and with events, update and query times over time
+    /// Write an HTML page with the same pictures, and plots of events, update time and query time
     #[arg(long, value_name = "OUT.html", help_heading = "Output")]
     pub html: Option<PathBuf>,
     /// Print one JSON object for each query time

@@ -41,7 +41,7 @@ pub struct CastArgs {
     /// Threads to prepare a raw input; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
     pub threads: Option<usize>,
-    /// Check prepared scans in full before use: checksums, and every number
+    /// Check prepared scans in full before use: checksums and all values
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
     /// Draw a depth image as PNG: one ray for each pixel, coloured by its length

@@ -30,9 +30,9 @@ pub struct ClashArgs {
     /// The scans and their poses
     #[command(flatten)]
     pub pair: PairArgs,
-    /// Distances that define the surfaces; by default those that the scans were prepared for
+    /// Metric of the kernel that defines the surfaces; by default the one the scans were prepared for
     ///
-    /// Raw inputs are prepared for the kernel, by default for straight distances.
+    /// Raw inputs are prepared for this kernel, or for straight distances without the option.
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans
@@ -52,7 +52,7 @@ pub struct ClashArgs {
     /// Write the list as one HTML file, with pictures
     #[arg(long, value_name = "OUT.html")]
     pub html: Option<PathBuf>,
-    /// Number of clashes that get a close-up on the page, at most
+    /// Largest number of clashes that get a close-up on the page
     #[arg(long, value_name = "N", requires = "html", default_value_t = 50)]
     pub pictures: usize,
     /// Threads to prepare raw inputs; 0 for all cores

@@ -28,7 +28,7 @@ pub struct CollideArgs {
     /// Stop at the first contact of --poses
     #[arg(long, requires = "poses")]
     pub first: bool,
-    /// Distances that define the surfaces; by default those that the scans were prepared for
+    /// Metric of the kernel that defines the surfaces; by default the one the scans were prepared for
     ///
     /// Raw inputs are prepared for the kernel given here. With the geodesic kernel, surfaces alone are
     /// compared and separations are estimated.
@@ -42,14 +42,14 @@ pub struct CollideArgs {
     /// `both` does what `mesh-collide` does. With `a` or `b`, the other input is a scan.
     #[arg(long, value_enum, value_name = "WHICH")]
     pub as_mesh: Option<AsMeshName>,
-    /// Report scans that come nearer than this as touching, in world units
+    /// Count scans as touching if they come nearer than this, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub margin: f64,
     /// Evidence required of a separation
     ///
-    /// A certified separation is proven. The proof adds half to the time of a query on average, and
-    /// near contact a query takes two to three times as long. The default is certified, but
-    /// estimated with the geodesic kernel.
+    /// A certified separation is proven. With the proof, a query takes 1.5 times as long on average,
+    /// and two to three times near contact. The default is `certified`, or `estimated` with the
+    /// geodesic kernel.
     #[arg(long, value_enum, help_heading = "Budget and evidence")]
     pub evidence: Option<EvidenceName>,
     /// Write the proof of each certified answer as a line of JSON, for an independent check
@@ -83,8 +83,8 @@ pub struct CollideArgs {
     pub search: SearchArgs,
     /// Threads; 0 for all cores
     ///
-    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The
-    /// answers do not depend on it.
+    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The answers do
+    /// not depend on the number of threads.
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
     pub threads: Option<usize>,
     /// Draw both scans and the place where they touch, as PNG
@@ -104,7 +104,7 @@ pub struct CollideArgs {
 /// The names of the levels of detail of a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DetailName {
-    /// Only its existence, to first order; fastest
+    /// Existence only, to first order; fastest
     Verdict,
     /// A point on both surfaces, verified where possible
     Witness,

@@ -26,7 +26,7 @@ pub struct ContactArgs {
     /// segment that two triangles have in common.
     #[arg(long, value_name = "LEN", requires = "all", allow_hyphen_values = true, value_parser = parse_radius)]
     pub link: Option<f64>,
-    /// Write the contacts of --all as points, with normals of a and the number of their clash
+    /// Write the contacts of --all as points, each with the normal of A and the number of its clash
     #[arg(long, value_name = "OUT.ply", requires = "all", conflicts_with = "poses", help_heading = "Output")]
     pub ply: Option<PathBuf>,
 }

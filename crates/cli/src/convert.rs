@@ -27,7 +27,7 @@ use spill::Spill;
 /// Options of `convert`.
 #[derive(Debug, Clone, Args)]
 pub struct ConvertArgs {
-    /// Point cloud, or a mesh, of which the vertices are taken
+    /// Point cloud or mesh; of a mesh, only the vertices are converted
     pub input: PathBuf,
     /// File to write; its name gives the format: ply, pcd, las, laz, xyz, txt, csv or npy
     pub output: PathBuf,

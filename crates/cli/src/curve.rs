@@ -28,7 +28,7 @@ pub struct CurveArgs {
     /// The scans and their poses
     #[command(flatten)]
     pub pair: PairArgs,
-    /// Distances that define the surfaces; by default those that the scans were prepared for
+    /// Metric of the kernel that defines the surfaces; by default the one the scans were prepared for
     #[arg(long, value_enum, help_heading = "Research", hide_short_help = true)]
     pub kernel: Option<KernelName>,
     /// Distance between points along a curve, in world units

@@ -34,20 +34,21 @@ pub struct DensityArgs {
     /// Largest share of wrong verdicts
     #[arg(long, value_name = "RATE", default_value_t = 0.001, value_parser = parse_rate)]
     pub error: f64,
-    /// Number of surfels from which the number of points is derived, next to the measured one
+    /// Number of surfels for the number of points that theory requires, which is reported beside the
+    /// measured one
     #[arg(long, value_name = "A", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub surfels: u32,
-    /// Poses at each of the 13 distances of the sweep
+    /// Poses at each of the 13 distances of `poses --sweep`
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
-    /// Measure brackets alone, as Klein & Zachmann 2005 do, without the searches that find what
-    /// brackets miss
+    /// Measure brackets alone, as Klein & Zachmann 2005 do, without the further searches for contacts
+    /// that brackets miss
     #[arg(long, conflicts_with = "store")]
     pub brackets_alone: bool,
     /// Keep the measured number in the file, for `collide --method interpolation --flat`
     #[arg(long)]
     pub store: bool,
-    /// Seed of everything random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Threads; 0 for all cores; the numbers do not depend on it

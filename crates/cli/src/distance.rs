@@ -37,7 +37,7 @@ pub struct DistanceArgs {
     /// The options for many poses
     #[command(flatten)]
     pub path: PathArgs,
-    /// Distances that define the surfaces; by default those that the scans were prepared for
+    /// Metric of the kernel that defines the surfaces; by default the one the scans were prepared for
     ///
     /// With the geodesic kernel, no lower bound is proven.
     #[arg(long, value_enum, conflicts_with = "thickened", help_heading = "Research", hide_short_help = true)]
@@ -50,11 +50,10 @@ pub struct DistanceArgs {
     /// With `both`, the distance is exact. With `a` or `b`, the other input is a scan.
     #[arg(long, value_enum, value_name = "WHICH")]
     pub as_mesh: Option<AsMeshName>,
-    /// Stop when the bounds differ by at most this share of the upper one: from 0 to less than
-    /// 1
+    /// Stop when the bounds differ by at most this fraction of the upper bound; at least 0, less than 1
     ///
-    /// If the scans are nearer to each other than about the local spacing, the bounds may stay
-    /// further apart. Has no effect with --surface-only and --thickened.
+    /// If the distance is less than about the local spacing, the bounds may stay further apart. This
+    /// option has no effect with --surface-only or --thickened.
     #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative, help_heading = "Budget and evidence")]
     pub relative: f64,
     /// Time limit for each query, such as 200us

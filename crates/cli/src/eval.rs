@@ -22,13 +22,13 @@ pub struct EvalArgs {
     /// standard input
     #[arg(long, value_name = "FILE")]
     pub points: PathBuf,
-    /// Distances that define the surface; by default those that the scan was prepared for
+    /// Metric of the kernel that defines the surface; by default the one the scan was prepared for
     #[arg(long, value_enum)]
     pub kernel: Option<KernelName>,
     /// Print one JSON object for each point
     #[arg(long)]
     pub json: bool,
-    /// Check prepared scans in full before use: checksums, and every number
+    /// Check prepared scans in full before use: checksums and all values
     #[arg(long)]
     pub verify: bool,
 }

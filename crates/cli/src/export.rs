@@ -32,8 +32,8 @@ pub struct ExportArgs {
     /// stray, red; 5 sparse, pink.
     #[arg(long, value_name = "P.ply")]
     pub points: Option<PathBuf>,
-    /// Samples of the nodes at --level, each with its node and the node's covering and sampling
-    /// radius, as PLY
+    /// Samples of the nodes at --level, with the node, its covering radius and its sampling radius, as
+    /// PLY
     #[arg(long, value_name = "S.ply", requires = "level")]
     pub samples: Option<PathBuf>,
     /// Boxes of the nodes, as lines, as OBJ
@@ -51,7 +51,7 @@ pub struct ExportArgs {
     /// Close pairs of each point: i,j,distance along the graph, nearest first
     #[arg(long, value_name = "C.csv")]
     pub close_pairs: Option<PathBuf>,
-    /// Draw the points in the colours of their kinds, with their shares, as PNG
+    /// Draw the points in the colours of their kinds, with the percentage of each kind, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
     /// From where the picture is taken
@@ -60,7 +60,7 @@ pub struct ExportArgs {
     /// Depth of the nodes to export; the root has depth 0; leaves at lesser depths are included
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
-    /// Check prepared scans in full before use: checksums, and every number
+    /// Check prepared scans in full before use: checksums and all values
     #[arg(long)]
     pub verify: bool,
     /// Show no progress

@@ -30,7 +30,7 @@ pub struct FilterArgs {
     /// The point nearest to the mean of the cube's points is kept.
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length, help_heading = "Filters")]
     pub voxel: Option<f64>,
-    /// Remove isolated points; often 16,2
+    /// Remove isolated points; common values are 16,2
     ///
     /// A point is removed if its mean distance to its K nearest neighbours exceeds the average
     /// of that distance by more than SIGMA standard deviations.

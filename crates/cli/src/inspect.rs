@@ -20,7 +20,7 @@ pub struct InspectArgs {
     /// Prepared scan or mesh (.nm)
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Check everything: checksums, ids, and every number
+    /// Check the whole file: checksums, point indices and all values
     #[arg(long)]
     pub verify: bool,
     /// Print one JSON object

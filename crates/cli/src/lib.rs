@@ -156,10 +156,10 @@ Example:
   nearmiss poses a.nm b.nm --near --per-distance 100 -o near.jsonl
   nearmiss collide a.nm b.nm --poses near.jsonl --json
 
-A line of the output is {\"a\":[16 numbers],\"b\":[16 numbers],\"d\":d}, with \"offset\" too for --near. The \
-matrices are row-major and map an object to the world. a stays where it is; d is the distance between the centres \
-of the bounding boxes, in the units of the files. offset is the shift along the line between the centres from first \
-contact: positive apart, negative further in.";
+Each line of the output is {\"a\":[16 numbers],\"b\":[16 numbers],\"d\":d}; with --near also \"offset\". The \
+matrices are row-major and map an object to the world. Scan A stays where it is; d is the distance between the \
+centres of the bounding boxes, in the units of the files. offset is the shift from first contact along the line \
+between the centres: positive if the scans are apart, negative if they overlap.";
 
 const ANIMATE_EXAMPLES: &str = "\
 Examples:
@@ -168,7 +168,7 @@ Examples:
   nearmiss animate cloth-*.ply --against-frames ball-*.ply --method refit";
 
 const SWEEP_EXAMPLES: &str = "\
-Examples; a line of path.jsonl is {\"b\":[16 numbers]}, or x y z qx qy qz qw:
+Examples, where each line of path.jsonl is {\"b\":[16 numbers]} or `x y z qx qy qz qw`:
   nearmiss sweep room.nm gripper.nm --path path.jsonl
   nearmiss sweep room.nm gripper.nm --path path.jsonl --clearance 0.02 --image sweep.png
   nearmiss sweep room.nm gripper.nm --path path.jsonl --json";
@@ -208,7 +208,7 @@ pub enum Command {
     Inspect(InspectArgs),
     /// Evaluate the implicit surface of a scan at given points
     #[command(
-        after_long_help = "Example; a line of at.txt is a point x y z:\n  nearmiss eval dragon.nm --points at.txt"
+        after_long_help = "Example, where each line of at.txt is a point `x y z`:\n  nearmiss eval dragon.nm --points at.txt"
     )]
     Eval(EvalArgs),
     /// Test whether two scans touch, where, and how near they come
@@ -241,13 +241,14 @@ pub enum Command {
     /// Find the first place where each of many rays hits a scan
     #[command(after_long_help = CAST_EXAMPLE)]
     Cast(CastArgs),
-    /// Follow a mesh or scan that deforms from frame to frame, and test it at every query time
+    /// Follow a mesh or scan that deforms from frame to frame, and test it for contact at regular times
     #[command(after_long_help = ANIMATE_EXAMPLES)]
     Animate(AnimateArgs),
-    /// Find how many random points keep the errors below a rate, for `collide --method interpolation --flat`
+    /// Find the number of random points that keeps the error rate below a limit, for `collide --method
+    /// interpolation --flat`
     #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
     Density(DensityArgs),
-    /// Generate test poses for `collide`: a sweep, or poses near contact
+    /// Generate test poses for `collide`: at thirteen distances, or near contact
     #[command(after_long_help = POSES_EXAMPLES)]
     Poses(PosesArgs),
     /// Export what is inside a prepared scan: points with normals, graph, boxes
@@ -258,7 +259,7 @@ pub enum Command {
     /// Sample points on the surface of a mesh
     #[command(after_long_help = SAMPLE_EXAMPLES)]
     Sample(SampleArgs),
-    /// Make and query slice maps: a building as a stack of images, to walk through
+    /// Make and query slice maps, which hold a building as a stack of images and can be walked through
     #[command(subcommand)]
     Slices(SlicesCommand),
 }

@@ -12,9 +12,9 @@ use crate::parse::parse_radius;
 pub struct MeaningArgs {
     /// Compare surfaces alone, and ignore points that sample no sheet
     ///
-    /// By default, points that sample no sheet count as small balls, of up to half the local spacing. With
-    /// the geodesic kernel, surfaces alone are compared in any case. Surfaces are those of
-    /// Klein & Zachmann 2004.
+    /// By default, points that sample no sheet count as small balls with a radius of up to half the
+    /// local spacing. With the geodesic kernel, surfaces alone are compared in any case. Surfaces are
+    /// those of Klein & Zachmann 2004.
     #[arg(long, conflicts_with = "thickened")]
     pub surface_only: bool,
     /// Compare balls of this radius about the points instead of surfaces

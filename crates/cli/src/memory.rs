@@ -10,10 +10,10 @@ use clap::Args;
 pub struct MemoryArgs {
     /// Memory limit, such as 500MB or 16GB
     ///
-    /// The default is the memory that the system has left; for `slices build` 4 GiB. A command that
-    /// needs more is refused before it starts. Within this limit, `slices build` works on disk,
-    /// beside the output. So does `preprocess` of points without a graph and without filters other
-    /// than --crop and --class.
+    /// By default, the memory that the system has available, or 4 GiB for `slices build`. A command
+    /// that needs more is refused before it starts. If --memory is given and does not suffice, `slices
+    /// build` works on disk, next to the output. `preprocess` does the same for points without a graph,
+    /// if --crop and --class are the only filters.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub memory: Option<u64>,
 }

@@ -14,17 +14,17 @@ use crate::path_plot::PathPlot;
 /// Options of commands that answer for many poses.
 #[derive(Debug, Clone, Args)]
 pub struct PathArgs {
-    /// Answer for many poses, one on each line of this file; `-` reads standard input
+    /// Answer one query for each pose in this file, one pose on each line; `-` reads standard input
     ///
-    /// A line is `{"a":[…],"b":[…]}`, where either may be left out, or the pose of b alone: 16,
-    /// 12 (KITTI) or 7 numbers (x y z qx qy qz qw), 8 with the time first (TUM), or a JSON
-    /// array. The file may also be a table with columns x,y,z,qx,qy,qz,qw. Each pose gets one
-    /// line of output, in order; a summary follows.
+    /// A line is `{"a":[…],"b":[…]}` (either may be left out), or the pose of B alone. The latter is
+    /// 16, 12 (KITTI) or 7 numbers (x y z qx qy qz qw), 8 with the time first (TUM), or a JSON array.
+    /// The file may also be a table with columns x,y,z,qx,qy,qz,qw. Each pose gets one line of output,
+    /// in order; a summary follows.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Write a table with a row for each pose of --poses, or for each contact of `collide --all`
+    /// Write a table with a row for each pose of --poses, or for each contact of --all
     ///
-    /// A row for a pose has its line, time, verdict, evidence, clearance and place, among others.
+    /// Among the columns for a pose are line number, time, verdict, evidence, clearance and place.
     #[arg(long, value_name = "OUT.csv", help_heading = "Output")]
     pub csv: Option<PathBuf>,
     /// Plot clearance and verdict over --poses, as SVG

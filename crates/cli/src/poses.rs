@@ -31,26 +31,27 @@ pub struct PosesArgs {
     pub a: PathBuf,
     /// Scan that is turned and moved
     pub b: PathBuf,
-    /// Make poses at thirteen distances of the centres, from 0 to 1.5 times the longest side of a
+    /// Make poses at thirteen distances between the centres, from 0 to 1.5 times the longest side of A
     ///
     /// Rotations and directions are random.
     #[arg(long)]
     pub sweep: bool,
-    /// Make poses shifted by up to 10 r from first contact, half of them without overlap
+    /// Make poses up to 10 r before or after first contact, half of them without overlap
     ///
-    /// r is the larger sampling radius. Two scans are in contact here when two of their points are r/2 apart;
-    /// where that happens is found by bisection, not by `collide`.
+    /// r is the larger sampling radius. First contact, found by bisection and not by `collide`, is
+    /// where the nearest points of the two scans are r/2 apart.
     #[arg(long)]
     pub near: bool,
     /// Scale both scans to a longest side of 2, and centre them
     ///
-    /// Without it the poses keep the units of the files: a stays where it is, and b keeps its size.
+    /// Without this option, poses keep the units of the files: A stays where it is, and B keeps its
+    /// size.
     #[arg(long)]
     pub normalise: bool,
     /// Number of poses at each distance (--sweep) or in all (--near)
     #[arg(long, alias = "count", value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
-    /// Seed of everything random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// File to write, for `collide --poses`; `-` writes to standard output
@@ -59,7 +60,7 @@ pub struct PosesArgs {
     /// Show no progress
     #[arg(long)]
     pub quiet: bool,
-    /// Check prepared scans in full before use: checksums, and every number
+    /// Check prepared scans in full before use: checksums and all values
     #[arg(long)]
     pub verify: bool,
 }

@@ -20,26 +20,26 @@ pub struct PairArgs {
     pub a: PathBuf,
     /// Second scan
     pub b: PathBuf,
-    /// Pose of a: `x y z qx qy qz qw`, or a 4×4 matrix
+    /// Pose of A: `x y z qx qy qz qw`, or a 4×4 matrix
     ///
-    /// The pose maps the object to the world. Give 7 numbers (a position and a unit
-    /// quaternion), 12 (the first three rows of a matrix) or 16 (a row-major 4×4 matrix, with
-    /// uniform scale allowed), in one argument; or a file that holds them.
+    /// The pose maps the object to the world. Give, as one argument, 7 numbers (a position and a unit
+    /// quaternion), 12 (the first three rows of a matrix) or 16 (a row-major 4×4 matrix, uniform scale
+    /// allowed); or give a file that holds them.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_a: Option<String>,
     /// Pose of b, in the same form
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_b: Option<String>,
-    /// Unit of a; the world is then in metres
+    /// Unit of A; if given, the world is in metres
     ///
     /// With --units-a or --units-b, scans are scaled to metres before their poses are applied.
     /// A scan without a unit is taken to be in metres.
     #[arg(long, value_enum, value_name = "U")]
     pub units_a: Option<UnitName>,
-    /// Unit of b; the world is then in metres
+    /// Unit of B; if given, the world is in metres
     #[arg(long, value_enum, value_name = "U")]
     pub units_b: Option<UnitName>,
-    /// Check prepared scans in full before use: checksums, and every number
+    /// Check prepared scans in full before use: checksums and all values
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
 }

@@ -45,7 +45,7 @@ pub struct SampleArgs {
     /// PLY file for the points
     #[arg(short, long, value_name = "CLOUD.ply")]
     pub output: PathBuf,
-    /// Largest distance of any place on the surface from a point, in the units of the mesh
+    /// Largest distance from any place on the surface to the nearest point, in the units of the mesh
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub spacing: Option<f64>,
     /// Number of points, spread uniformly by area

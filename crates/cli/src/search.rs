@@ -26,21 +26,20 @@ pub struct SearchArgs {
     /// Test points for each pair of leaves, with `--method sampling`
     #[arg(long, value_name = "N", default_value_t = Sampling::default().test_points, help_heading = "Research", hide_short_help = true)]
     pub test_points: u32,
-    /// Largest |f_A| + |f_B| of a test point in contact, in sampling radii, with `--method
-    /// sampling`
+    /// Largest |f_A| + |f_B| at which a test point counts as a contact, in sampling radii, with
+    /// `--method sampling`
     #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance, help_heading = "Research", hide_short_help = true)]
     pub tolerance: f64,
-    /// Number of surfels that the surface of a is divided into, with `--method interpolation
-    /// --flat`
+    /// Number of surfels into which the surface of A is divided, with `--method interpolation --flat`
     ///
-    /// A number, or `adapted` for surfels that are 8 sampling radii wide. By default the number
-    /// that `density --store` kept with a, or 30.
+    /// A number, or `adapted` for surfels that are 8 sampling radii wide. The default is the number
+    /// that `density --store` kept in the file of A, or else 30.
     #[arg(long, value_name = "A", value_parser = parse_surfels, help_heading = "Research", hide_short_help = true)]
     pub surfels: Option<SurfelSize>,
-    /// Probability that a surfel gets a point, with `--method interpolation --flat`
+    /// Probability that every surfel contains a drawn point, with `--method interpolation --flat`
     #[arg(long, value_name = "P", default_value_t = Interpolation::default().probability, help_heading = "Research", hide_short_help = true)]
     pub probability: f64,
-    /// Source of the second end of a bracket, with `--method interpolation --flat`
+    /// Source of the second point of a bracket, with `--method interpolation --flat`
     #[arg(long, value_enum, default_value_t = BracketsName::Drawn, help_heading = "Research", hide_short_help = true)]
     pub brackets: BracketsName,
     /// Method that finds a point on both surfaces, with `--method interpolation`
@@ -57,8 +56,8 @@ pub struct SearchArgs {
     pub coverings: bool,
     /// Finest resolution, in world units
     ///
-    /// Nodes whose samples cover their surface within this length are compared by these samples.
-    /// The answer is then estimated.
+    /// If the samples of a node cover its surface to within this length, the samples are compared and
+    /// the node is not split. The answer is then estimated.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true, value_parser = parse_radius, help_heading = "Budget and evidence")]
     pub resolution: Option<f64>,
 }
@@ -78,7 +77,7 @@ pub enum MethodName {
 /// The names of the sources of the second end of a bracket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BracketsName {
-    /// The nearest drawn point on the other side
+    /// The nearest randomly drawn point on the other side
     Drawn,
     /// The nearest point in the close-pairs map of a, which `preprocess --close-pairs` adds
     /// (Klein & Zachmann 2005, section 4.3)
@@ -88,11 +87,12 @@ pub enum BracketsName {
 /// The names of the methods that find a point on both surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RefinementName {
-    /// By Newton's method on both
+    /// By Newton's method on both surfaces
     Newton,
-    /// By random points in a sphere (section 4.6), to 0.1 sampling radii
+    /// By random points in a sphere, to within 0.1 sampling radii of both surfaces (Klein & Zachmann
+    /// 2005, section 4.6)
     Sphere,
-    /// By a regular grid in a sphere, to 0.1 sampling radii
+    /// By a regular grid in a sphere, to within 0.1 sampling radii of both surfaces
     Grid,
 }
 
@@ -118,11 +118,13 @@ pub enum OrderName {
     Depth,
     /// Pairs whose boxes overlap most come first
     Overlap,
-    /// Pairs with most sample points on either side of the other surface come first (section 5.2)
+    /// Pairs with most sample points on both sides of the other surface come first (Klein & Zachmann
+    /// 2004, section 5.2)
     Sides,
-    /// The same, weighted by the eigenvalue gap
+    /// As `sides`, with sample points weighted by the eigenvalue gap (Klein & Zachmann 2004, section 7)
     SidesByGap,
-    /// Pairs whose surfaces are expected to fill most common cells come first (slides, 2003)
+    /// Pairs with most grid cells that both surfaces are expected to fill come first (Klein & Zachmann,
+    /// slides, 2003)
     Cells,
 }
 

@@ -33,16 +33,16 @@ pub struct SweepArgs {
     pub pair: PairArgs,
     /// Poses of the path, one on each line of this file; `-` reads standard input
     ///
-    /// Lines have the forms that `collide --poses` takes: `{"a":[…],"b":[…]}`, where either may
-    /// be left out, or the pose of b alone. From line to line each scan moves by a screw: a steady
-    /// rotation about an axis and a steady shift along it. It turns the shorter way, by at most
-    /// half a turn; give more lines for more. The scale must stay the same.
+    /// Lines have the forms that `collide --poses` takes: `{"a":[…],"b":[…]}`, where either may be left
+    /// out, or the pose of b alone. From line to line each scan moves by a screw: a steady rotation
+    /// about an axis and a steady shift along it. A rotation takes the shorter way, at most half a
+    /// turn; for larger rotations, give intermediate poses. The scale must stay the same.
     #[arg(long, alias = "poses", value_name = "FILE")]
     pub path: PathBuf,
     /// Distance that the scans must keep, in world units
     #[arg(long, alias = "margin", value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub clearance: f64,
-    /// Distances that define the surfaces; by default those that the scans were prepared for
+    /// Metric of the kernel that defines the surfaces; by default the one the scans were prepared for
     ///
     /// With the geodesic kernel, nothing is proven.
     #[arg(long, value_enum, conflicts_with = "thickened", help_heading = "Research", hide_short_help = true)]
@@ -55,7 +55,7 @@ pub struct SweepArgs {
     pub as_mesh: Option<AsMeshName>,
     /// Time limit for the whole motion, such as 50ms
     ///
-    /// The unit is ns, us, ms or s. The answer states what is proven by then.
+    /// The unit is ns, us, ms or s. When time runs out, the answer states what has been proven.
     #[arg(long, value_name = "50ms", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
     pub budget: Option<Duration>,
     /// Work limit for the whole motion; reproducible, unlike time
@@ -66,7 +66,7 @@ pub struct SweepArgs {
     /// Threads to prepare raw inputs; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
     pub threads: Option<usize>,
-    /// Draw the motion with the clearance as colour, and the clearance over time, as PNG
+    /// Draw the motion, coloured by clearance, and a plot of clearance over time, as PNG
     #[arg(long, value_name = "OUT.png", help_heading = "Output")]
     pub image: Option<PathBuf>,
     /// From where the picture is taken

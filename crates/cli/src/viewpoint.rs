@@ -14,8 +14,8 @@ use nearmiss_draw::canvas::{Area, Camera};
 pub struct ViewArgs {
     /// Axis that points up in the picture: x, y, z, -x, -y or -z
     ///
-    /// The default is z for rooms, buildings and streets, which have level floors and are wider than
-    /// high. Other scans are drawn with their longest side level.
+    /// The default is z if the scan looks like a room, building or street: it has level floors and is
+    /// wider than high. Other scans are drawn with their longest side horizontal.
     #[arg(
         long,
         value_name = "AXIS",
@@ -26,9 +26,9 @@ pub struct ViewArgs {
     pub up: Option<Up>,
     /// Direction from which the picture is taken, in degrees
     ///
-    /// With this option, the default of --up is z. The azimuth is counted anticlockwise as seen
-    /// from above. Azimuths 0 and 90 look from +x and +y; with --up y from +z and +x; with
-    /// --up x from +y and +z. Elevation 0 is a view from the side, 90 from above.
+    /// With this option, the default of --up is z. The azimuth is counted anticlockwise as seen from
+    /// above. Azimuth 0 looks from +x and 90 from +y; with --up y from +z and +x, with --up x from +y
+    /// and +z. Elevation 0 is a view from the side, 90 from above.
     #[arg(
         long,
         value_name = "AZIMUTH,ELEVATION",

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::ops::{Deref, Range};
+use std::ptr::NonNull;
 use std::sync::Arc;
 
 use bytemuck::Pod;
@@ -10,23 +11,27 @@ use crate::bytes::Bytes;
 
 /// A read-only array of plain-old-data elements, backed by a `Vec` or by the bytes of a container.
 ///
-/// Derefs to `[T]`. Cloning increments a reference count and copies nothing. To change the values
-/// of one clone, use [`Array::to_mut`], which copies shared elements first.
-///
-/// Each deref of an array in a file checks bounds and alignment again, which takes some
-/// nanoseconds. Take the slice once, outside the loop.
+/// Derefs to `[T]`, at the cost of two loads. Cloning increments a reference count and copies nothing.
+/// To change the values of one clone, use [`Array::to_mut`], which copies shared elements first.
 pub struct Array<T> {
+    /// The elements, which `backing` keeps alive and in place.
+    elements: NonNull<[T]>,
     backing: Backing<T>,
 }
 
 enum Backing<T> {
     Owned(Arc<Vec<T>>),
-    /// A range whose address and length suit `T`.
-    InPlace {
-        bytes: Bytes,
-        range: Range<usize>,
-    },
+    InPlace(Bytes),
 }
+
+// SAFETY: an array is a shared reference to its elements together with the backing, both of which may be
+// sent to and shared with other threads. `elements` is written through only by `to_mut`, which borrows
+// the array mutably and owns the backing alone.
+#[expect(unsafe_code, reason = "a pointer to elements that the same struct keeps alive")]
+unsafe impl<T: Send + Sync> Send for Array<T> {}
+// SAFETY: as above.
+#[expect(unsafe_code, reason = "a pointer to elements that the same struct keeps alive")]
+unsafe impl<T: Send + Sync> Sync for Array<T> {}
 
 impl<T: Pod> Array<T> {
     /// Creates an array of the elements in `range` of `bytes`: in place if the address is aligned
@@ -35,18 +40,17 @@ impl<T: Pod> Array<T> {
     /// The length of `range` must be a multiple of the size of `T`; the caller has compared element
     /// sizes.
     pub(crate) fn in_place(bytes: Bytes, range: Range<usize>) -> Self {
-        let raw = &bytes.as_slice()[range.clone()];
-        let backing = match bytemuck::try_cast_slice::<u8, T>(raw) {
-            Ok(_) => Backing::InPlace { bytes, range },
-            Err(_) => Backing::Owned(Arc::new(bytemuck::pod_collect_to_vec(raw))),
-        };
-        Self { backing }
+        let raw = &bytes.as_slice()[range];
+        match bytemuck::try_cast_slice::<u8, T>(raw) {
+            Ok(elements) => Self { elements: NonNull::from(elements), backing: Backing::InPlace(bytes) },
+            Err(_) => bytemuck::pod_collect_to_vec(raw).into(),
+        }
     }
 
     /// Returns `true` if the elements are bytes of a container, without memory of their own.
     #[must_use]
     pub fn is_in_place(&self) -> bool {
-        matches!(self.backing, Backing::InPlace { .. })
+        matches!(self.backing, Backing::InPlace(_))
     }
 
     /// Converts the array to a `Vec`, without a copy if this is the only clone and is backed by a
@@ -55,7 +59,7 @@ impl<T: Pod> Array<T> {
     pub fn into_vec(self) -> Vec<T> {
         match self.backing {
             Backing::Owned(elements) => Arc::unwrap_or_clone(elements),
-            Backing::InPlace { .. } => self.to_vec(),
+            Backing::InPlace(_) => self.to_vec(),
         }
     }
 
@@ -63,23 +67,37 @@ impl<T: Pod> Array<T> {
     /// another clone, so the file and other clones keep their values.
     pub fn to_mut(&mut self) -> &mut [T] {
         if self.is_in_place() {
-            self.backing = Backing::Owned(Arc::new(self.to_vec()));
+            *self = self.to_vec().into();
         }
         match &mut self.backing {
-            Backing::Owned(elements) => Arc::make_mut(elements).as_mut_slice(),
-            Backing::InPlace { .. } => &mut [],
+            Backing::Owned(elements) => {
+                let elements = Arc::make_mut(elements);
+                self.elements = pointer_to(elements);
+                elements
+            }
+            Backing::InPlace(_) => &mut [],
         }
     }
 }
 
-impl<T: Pod> Deref for Array<T> {
+/// Returns a pointer to the elements, which stays valid until the vector is changed or dropped.
+fn pointer_to<T>(elements: &Vec<T>) -> NonNull<[T]> {
+    // From the vector's own pointer rather than a slice, so that a write through the vector leaves it
+    // valid.
+    let start = NonNull::new(elements.as_ptr().cast_mut()).unwrap_or(NonNull::dangling());
+    NonNull::slice_from_raw_parts(start, elements.len())
+}
+
+impl<T> Deref for Array<T> {
     type Target = [T];
 
+    #[inline]
+    #[expect(unsafe_code, reason = "a pointer to elements that the same struct keeps alive")]
     fn deref(&self) -> &[T] {
-        match &self.backing {
-            Backing::Owned(elements) => elements,
-            Backing::InPlace { bytes, range } => bytemuck::cast_slice(&bytes.as_slice()[range.clone()]),
-        }
+        // SAFETY: `elements` points to initialised elements of the vector or the bytes of `backing`.
+        // Neither moves or changes its content: a vector is behind an `Arc`, and only `to_mut` writes
+        // to it, which sets `elements` anew and holds the array borrowed; bytes are never written.
+        unsafe { self.elements.as_ref() }
     }
 }
 
@@ -87,11 +105,9 @@ impl<T> Clone for Array<T> {
     fn clone(&self) -> Self {
         let backing = match &self.backing {
             Backing::Owned(elements) => Backing::Owned(Arc::clone(elements)),
-            Backing::InPlace { bytes, range } => {
-                Backing::InPlace { bytes: bytes.clone(), range: range.clone() }
-            }
+            Backing::InPlace(bytes) => Backing::InPlace(bytes.clone()),
         };
-        Self { backing }
+        Self { elements: self.elements, backing }
     }
 }
 
@@ -103,7 +119,7 @@ impl<T> Default for Array<T> {
 
 impl<T> From<Vec<T>> for Array<T> {
     fn from(elements: Vec<T>) -> Self {
-        Self { backing: Backing::Owned(Arc::new(elements)) }
+        Self { elements: pointer_to(&elements), backing: Backing::Owned(Arc::new(elements)) }
     }
 }
 
@@ -180,6 +196,21 @@ mod tests {
         let address = array.as_ptr();
         array.to_mut()[0] = 2;
         assert_eq!(array.as_ptr(), address);
+    }
+
+    #[test]
+    fn elements_outlive_the_array_they_came_from() {
+        for array in [Array::from(vec![5_u32; 16]), Array::in_place(given(vec![5; 64]), 0..64)] {
+            let mut clone = array.clone();
+            let moved = Box::new(array);
+            let first = moved[0];
+            drop(moved);
+            assert_eq!(*clone, [first; 16]);
+            clone.to_mut()[3] = 1;
+            let again = clone.clone();
+            clone.to_mut()[3] = 2;
+            assert_eq!((again[3], clone[3]), (1, 2));
+        }
     }
 
     #[test]

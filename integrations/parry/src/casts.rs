@@ -1,15 +1,20 @@
-//! The first impact of a shape that moves past a scan, by [`Target::sweep`](nearmiss::Target::sweep).
+//! The first impact of a shape that moves past a scan, by [`Target::sweep`](nearmiss::Target::sweep), and
+//! of another scan, by [`Sweep`].
 
 use parry3d::math::{Real, Vector};
 use parry3d::query::{NonlinearRigidMotion, ShapeCastHit, ShapeCastOptions, ShapeCastStatus, Unsupported};
 use parry3d::shape::TypedShape;
 
-use nearmiss::{Motion, Pose, Ray, Shape, ShapeContact, ShapeSweepVerdict};
+use nearmiss::{
+    Contact, Motion, Pose, Prepared as _, Ray, Shape, ShapeContact, ShapeSweepVerdict, Sweep, SweepOptions,
+    SweepPlan, SweepVerdict,
+};
 
 use crate::convert::{from_pose, from_vector, to_real, to_vector};
+use crate::manifolds::{Touch, deepest};
 use crate::parts::for_parts;
 use crate::question::Question;
-use crate::scan_shape::with_scratch;
+use crate::scan_shape::{ScanShape, with_scratch};
 
 /// The angle of a piece of a motion, which is a screw, in radians. The path of the centre of mass, which
 /// is straight, differs from it by about an eightieth of the way of a piece.
@@ -116,12 +121,15 @@ fn passes(asked: &Question<'_>, course: &Course) -> Option<Impact> {
     }
 }
 
-/// The first impact of any part of the other shape.
+/// The first impact of any part of the other shape, or of the other scan.
 fn first_impact(
     asked: &Question<'_>,
     course: &Course,
     target_distance: Real,
 ) -> Result<Option<Impact>, Unsupported> {
+    if let Some(other) = asked.other_scan() {
+        return first_impact_of_scans(asked, other, course, target_distance);
+    }
     let target = asked.scan.target_within(target_distance);
     let mut first: Option<Impact> = None;
     let margin = to_real(course.way) + target_distance;
@@ -134,6 +142,47 @@ fn first_impact(
         }
     })?;
     Ok(first)
+}
+
+fn first_impact_of_scans(
+    asked: &Question<'_>,
+    other: &ScanShape,
+    course: &Course,
+    target_distance: Real,
+) -> Result<Option<Impact>, Unsupported> {
+    let options = SweepOptions::default()
+        .with_semantics(asked.scan.semantics())
+        .with_clearance(f64::from(target_distance).max(0.0));
+    let plan = SweepPlan::new(&options, asked.scan.scan(), other.scan()).or(Err(Unsupported))?;
+    let still = Motion::still(*asked.scan.pose());
+    let moving = course.of(&from_pose(&asked.pose).after(other.pose()))?;
+    let sweep = Sweep::new(asked.scan.scan().along(&still), other.scan().along(&moving));
+    let answer = with_scratch(|scratch| sweep.first_impact(&plan, scratch));
+    let SweepVerdict::Impact { t_hit: time, contact, .. } = answer.verdict else { return Ok(None) };
+    // At first, the scans may be moving apart, so the side decides.
+    let deepest = if time <= 0.0 { deepest_contact(asked, target_distance)? } else { None };
+    let contact = deepest.unwrap_or_else(|| against(&contact, course.velocity(time, contact.point)));
+    Ok(Some(Impact { time, part: 0, contact }))
+}
+
+/// The deepest contact of two scans.
+fn deepest_contact(asked: &Question<'_>, within: Real) -> Result<Option<ShapeContact>, Unsupported> {
+    let mut touches = Vec::new();
+    asked.contacts(within, None, &mut |_, _, touch| touches.push(*touch))?;
+    Ok(deepest(touches.into_iter(), within).map(|Touch { points: [point, _], normal, gap, .. }| {
+        ShapeContact { point, normal, depth: -gap, id: 0 }
+    }))
+}
+
+/// A contact where surfaces meet first. Where the border of one meets the inside of the other, only the
+/// normal of the latter is that of the contact. That is the one more against the velocity of the second.
+fn against(contact: &Contact, velocity: [f64; 3]) -> ShapeContact {
+    let along = |n: [f64; 3]| (0..3).map(|k| n[k] * velocity[k]).sum::<f64>();
+    let speed = along(velocity).sqrt();
+    let [a, b] = contact.normals.unwrap_or([velocity.map(|c| c / speed.max(f64::MIN_POSITIVE)); 2]);
+    let normal = if along(a).abs() >= along(b).abs() { a } else { b };
+    let normal = if along(normal) > 0.0 { normal.map(|c| -c) } else { normal };
+    ShapeContact { point: contact.point, normal, depth: 0.0, id: 0 }
 }
 
 impl Course {
@@ -163,6 +212,20 @@ impl Course {
         let way = 1.01 * ways.sum::<f64>() + angle * f64::from(sphere.radius);
         let motion = Motion::through(&poses).or(Err(Unsupported))?;
         Ok(Self { motion, rate, start: f64::from(start), way })
+    }
+
+    /// The velocity of the other shape at `point` just before `time`, which is above zero.
+    fn velocity(&self, time: f64, point: [f64; 3]) -> [f64; 3] {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most `PIECES`")]
+        let piece = (time.ceil() - 1.0).max(0.0) as usize;
+        self.motion.screw(piece).velocity(point)
+    }
+
+    /// The motion of what is at `pose` at first.
+    fn of(&self, pose: &Pose) -> Result<Motion, Unsupported> {
+        let ends = (0_u32..).map(f64::from).take_while(|time| *time <= self.motion.duration());
+        let poses: Vec<Pose> = ends.map(|time| self.motion.at(time).after(pose)).collect();
+        Motion::through(&poses).or(Err(Unsupported))
     }
 
     fn told(&self, asked: &Question<'_>, impact: &Impact) -> ShapeCastHit {

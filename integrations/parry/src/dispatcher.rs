@@ -86,7 +86,6 @@ impl QueryDispatcher for ScanDispatcher {
         })
     }
 
-    /// Supported for all shapes but another scan.
     fn cast_shapes(
         &self,
         pos12: &Pose,
@@ -106,7 +105,7 @@ impl QueryDispatcher for ScanDispatcher {
         Ok(hit.filter(|hit| options.stop_at_penetration || !is_leaving(hit)))
     }
 
-    /// Supported for all shapes but another scan. If they touch at `start_time`, and
+    /// If the shapes touch at `start_time`, and
     /// `stop_at_penetration` is `false`, a ball about the centre of mass is asked for instead, with a
     /// quarter of the shape's thickness. So no shape passes through by its centre.
     fn cast_shapes_nonlinear(

@@ -40,11 +40,13 @@ pub(crate) fn for_parts(
         return Ok(());
     }
     let centre = Some(from_vector(pose * shape.compute_local_bounding_sphere().center()));
+    let mut are_convex = true;
     let mut part = |id: u32, part_pose: Option<&Pose>, part: &dyn ParryShape| {
         let placed = part_pose.map_or(*pose, |inner| pose * inner);
-        with_convex(part, &placed, reach, |convex| {
+        let is_convex = with_convex(part, &placed, reach, |convex| {
             visit(&Part { id, pose: part_pose.copied(), shape: convex, centre });
         });
+        are_convex &= is_convex.is_some();
     };
     if let Some(composite) = shape.as_composite_shape() {
         let near = margin.map(|margin| (margin, scan.target_within(margin)));
@@ -52,7 +54,7 @@ pub(crate) fn for_parts(
         for id in composite.bvh().leaves(|node| is_near(&node.aabb())) {
             composite.map_part_at(id, &mut |inner, shape, _| part(id, inner, shape));
         }
-        return Ok(());
+        return are_convex.then_some(()).ok_or(Unsupported);
     }
     match shape.as_typed_shape() {
         TypedShape::HeightField(field) => {

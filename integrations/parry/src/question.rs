@@ -54,9 +54,14 @@ impl<'a> Question<'a> {
         Self::new(pos12, g1, g2).ok_or(Unsupported)
     }
 
+    /// The other shape, if that is a scan as well.
+    pub(crate) fn other_scan(&self) -> Option<&'a ScanShape> {
+        scan_of(self.other)
+    }
+
     /// Both scans, the second in the frame of the first.
     fn pair(&self) -> Option<(&'a ScanShape, Pair<'a>)> {
-        let other = scan_of(self.other)?;
+        let other = self.other_scan()?;
         let placed = from_pose(&self.pose).after(other.pose());
         let pair = Pair::new(self.scan.scan().at(self.scan.pose()), other.scan().at(&placed));
         Some((other, pair))

@@ -9,7 +9,9 @@ use parry3d::math::{Mat3, Real, Vector};
 use parry3d::query::{PointProjection, PointQuery, Ray as ParryRay, RayCast, RayIntersection};
 use parry3d::shape::{FeatureId, Shape as ParryShape, ShapeType, SharedShape, TypedShape};
 
-use nearmiss::{CollideOptions, CollidePlan, PlanError, Pose, Ray, Scan, Scratch, Shape, ShapePlan, Target};
+use nearmiss::{
+    CollideOptions, CollidePlan, PlanError, Pose, Ray, Scan, Scratch, Semantics, Shape, ShapePlan, Target,
+};
 
 use crate::convert::{from_vector, to_real, to_vector};
 
@@ -121,6 +123,11 @@ impl ScanShape {
     /// Maps the scan to the frame of the shape.
     pub(crate) fn pose(&self) -> &Pose {
         &self.0.pose
+    }
+
+    /// What counts as the scan.
+    pub(crate) fn semantics(&self) -> Semantics {
+        self.0.options.semantics
     }
 
     pub(crate) fn target(&self) -> Target<'_> {

@@ -109,8 +109,63 @@ fn all_shapes_stop_at_a_floor_in_either_order() {
     let pose = Pose::new(Vector::new(5.0, -1.0, 3.0), Vector::ZERO);
     let hit = ScanDispatcher.cast_shapes(&pose, Vector::Y * 4.0, &floor, &below, options).expect("supported");
     assert!((hit.expect("a hit").time_of_impact - 0.25).abs() < 1e-3, "{hit:?}");
-    let scans = ScanDispatcher.cast_shapes(&pose, Vector::Y, &floor, &floor, options);
-    assert!(scans.is_err(), "two scans are not supported");
+}
+
+#[test]
+fn a_scan_stops_at_a_scan_where_small_steps_touch_first() {
+    let (floor, dragon) = (floor(), dragon());
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(9);
+    let mut vector = |size: f32| Vector::from_array([0; 3].map(|_| random.random_range(-size..size)));
+    let small = dragon.placed(&nearmiss::Pose::IDENTITY.with_scale(2.0));
+    let touches = |pose: &Pose| {
+        let found = ScanDispatcher.intersection_test(pose, &floor, &small);
+        found.expect("supported").intersecting
+    };
+    for round in 0..6 {
+        let pose = Pose::new(Vector::new(0.5, 0.8, 0.5) + vector(0.1), vector(3.0));
+        let velocity = Vector::new(0.0, -1.0, 0.0) + vector(0.2);
+        let options = ShapeCastOptions::with_max_time_of_impact(2.0);
+        let hit = ScanDispatcher.cast_shapes(&pose, velocity, &floor, &small, options).expect("supported");
+        let hit = hit.expect("it falls on the floor");
+        let away = pose.rotation.inverse() * -velocity;
+        let flipped = ScanDispatcher.cast_shapes(&pose.inverse(), away, &small, &floor, options);
+        let flipped = flipped.expect("supported").expect("a hit").swapped();
+        assert!((hit.time_of_impact - flipped.time_of_impact).abs() < 0.008, "{hit:?} {flipped:?}");
+        let moved = |time: f32| Pose::from_parts(pose.translation + velocity * time, pose.rotation);
+        let first = (0..2000_u16).map(|k| f32::from(k) * 1e-3).find(|&time| touches(&moved(time)));
+        let first = first.expect("small steps touch");
+        // Tests are a quarter of a spacing of 0.02 apart, and contacts count within a twentieth of a disc.
+        assert!((hit.time_of_impact - first).abs() < 0.008, "round {round}: {hit:?}, small steps {first}");
+        // The normal is that of either surface; the dragon is round.
+        assert!(hit.normal1.y > 0.9 && hit.witness1.y.abs() < 0.01, "round {round}: {hit:?}");
+        let on_small = moved(hit.time_of_impact) * hit.witness2;
+        assert!((on_small - hit.witness1).length() < 0.01, "round {round}: {hit:?} {on_small}");
+        let short = ShapeCastOptions::with_max_time_of_impact(first - 0.01);
+        let none = ScanDispatcher.cast_shapes(&pose, velocity, &floor, &small, short).expect("supported");
+        assert!(none.is_none(), "round {round}: {none:?}, small steps {first}");
+        // The same, while it turns about its middle.
+        let middle = small.compute_local_aabb().center();
+        let turning = NonlinearRigidMotion::new(pose, middle, velocity, vector(3.0));
+        let still = NonlinearRigidMotion::constant_position(Pose::IDENTITY);
+        let cast = |stops: bool| {
+            let hit = ScanDispatcher.cast_shapes_nonlinear(&still, &floor, &turning, &small, 0.0, 2.0, stops);
+            hit.expect("supported").expect("a hit").time_of_impact
+        };
+        let first = (0..2000_u16)
+            .map(|k| f32::from(k) * 1e-3)
+            .find(|&time| touches(&turning.position_at_time(time)))
+            .expect("small steps touch");
+        assert!((cast(true) - first).abs() < 0.008, "round {round}: {}, small steps {first}", cast(true));
+        assert_eq!(cast(false), cast(true), "they are apart at first");
+    }
+}
+
+#[test]
+fn compounds_with_scans_are_refused_rather_than_passed() {
+    let floor = floor();
+    let compound = Compound::new(vec![(Pose::IDENTITY, floor.clone().shared())]);
+    let found = ScanDispatcher.intersection_test(&Pose::IDENTITY, &floor, &compound);
+    assert!(found.is_err(), "expected no answer, got {found:?}");
 }
 
 #[test]

@@ -23,14 +23,15 @@ use crate::picture::splat;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[non_exhaustive]
 pub enum AnimateMethod {
-    /// Refit, and prepare anew when the bounds are too loose; kinetic for two meshes with many query times a
-    /// file, if that is faster
+    /// Refit, and rebuild when the bounding volumes are too loose; kinetic for two meshes with many
+    /// query times between files, if that is faster
     Auto,
-    /// Refit the bounds; the order of triangles or points stays
+    /// Refit the bounding volumes and keep the order of triangles or points
     Refit,
     /// Prepare every frame anew
     Rebuild,
-    /// Update a box only when other points come to determine it (Zachmann & Weller 2006); two meshes
+    /// Update a box only when another point becomes extremal on one of its sides (Zachmann & Weller
+    /// 2006); for two meshes only
     Kinetic,
 }
 

@@ -31,10 +31,10 @@ pub struct MeshCollideArgs {
     /// The treatment of the contacts
     #[command(flatten)]
     pub contacts: ContactArgs,
-    /// Also tell how far and in which direction to move b out of a
+    /// Also report how far and in which direction to move B out of A
     ///
-    /// Closed parts count as solid, other parts as surfaces. The length lies between two bounds,
-    /// which hold even if --budget or --work ends the search.
+    /// Closed parts count as solid, other parts as surfaces. The distance is reported as a lower and an
+    /// upper bound, which hold even if --budget or --work ends the search.
     #[arg(long)]
     pub penetration: bool,
     /// Time limit for each query, such as 200us
@@ -47,20 +47,21 @@ pub struct MeshCollideArgs {
     /// A unit is one node pair; 500 to 10000 is common.
     #[arg(long, value_name = "N", value_parser = parse_work, help_heading = "Budget and evidence")]
     pub work: Option<u64>,
-    /// Probability from which on a pair of nodes counts as colliding
+    /// Probability at which a node pair starts to count as colliding
     ///
-    /// The search then visits the most probable pairs first, and stops once --k-min of them count.
-    /// `separated` and `intersecting` stay exact; other answers become `undecided` (Klein & Zachmann
-    /// 2003).
+    /// The search then visits the most probable pairs first, and stops when --k-min pairs have this
+    /// probability. The answers `separated` and `intersecting` stay exact; a search that stops early
+    /// answers `undecided` (Klein & Zachmann 2003).
     #[arg(long, value_name = "P", value_parser = parse_probability, conflicts_with = "all", help_heading = "Budget and evidence")]
     pub p_min: Option<f64>,
-    /// Number of such pairs at which the search stops [default: 3]
+    /// Number of node pairs with at least the probability --p-min at which the search stops [default:
+    /// 3]
     #[arg(long, value_name = "K", requires = "p_min", value_parser = parse_pairs, help_heading = "Budget and evidence")]
     pub k_min: Option<u32>,
     /// Threads; 0 for all cores
     ///
-    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The
-    /// answers do not depend on it.
+    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The answers do
+    /// not depend on the number of threads.
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
     pub threads: Option<usize>,
     /// Draw both meshes and their contacts, as PNG

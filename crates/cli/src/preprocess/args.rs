@@ -20,7 +20,7 @@ pub struct PreprocessArgs {
     ///
     /// The points of a mesh are its vertices; `nearmiss sample` puts points on its faces.
     pub input: PathBuf,
-    /// Prepared scan or mesh to write, usually named .nm; an existing file is replaced in one step
+    /// Prepared scan or mesh to write, usually named .nm; an existing file is replaced atomically
     #[arg(short, long, value_name = "OUT.nm")]
     pub output: PathBuf,
     /// Format of the input; auto decides by content, then by name
@@ -40,17 +40,17 @@ pub struct PreprocessArgs {
     /// The filters
     #[command(flatten)]
     pub filters: FilterArgs,
-    /// Number of neighbours within the local radius of a point, 3 to 32; more where points lie on
-    /// lines
+    /// Number of neighbours within the local radius of a point, 3 to 32; where points lie on lines, the
+    /// radius is widened
     #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32), help_heading = "Surface")]
     pub radius_neighbours: u32,
     /// Largest gap to bridge between points, in the units of the input
     ///
-    /// A wider gap counts as a hole. Balls about points have at most this diameter. The default is
-    /// twice the sampling radius (the 0.9-quantile of the local radii).
+    /// A wider gap counts as a hole. The balls around points that sample no sheet have at most this
+    /// diameter. The default is twice the sampling radius (the 0.9-quantile of the local radii).
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach, help_heading = "Surface")]
     pub reach: Option<f64>,
-    /// Weight of a point by its distance
+    /// Weight of a point as a function of its distance
     #[arg(long, value_enum, default_value_t = WeightName::Gaussian, help_heading = "Research", hide_short_help = true)]
     pub weight: WeightName,
     /// Width over which points are averaged: local (follows the spacing), global, or a length
@@ -59,12 +59,11 @@ pub struct PreprocessArgs {
     /// Points in a leaf of the hierarchy, 4 to 64
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(4..=64), help_heading = "Research", hide_short_help = true)]
     pub leaf: u32,
-    /// Add the proximity graph: normals are oriented, and curves and paths along the surface
-    /// can be found
+    /// Add the proximity graph, which orients normals and provides paths along the surface
     #[arg(long, help_heading = "Graph")]
     pub graph: bool,
-    /// Number of neighbours that sets the size of spheres of influence, 1 to 32; by default 4;
-    /// implies --graph
+    /// Rank of the neighbour that a point's sphere of influence reaches, 1 to 32; by default 4; implies
+    /// --graph
     ///
     /// The sphere of influence of a point reaches to its R-th nearest neighbour. The graph joins
     /// two points if their spheres overlap.
@@ -79,7 +78,7 @@ pub struct PreprocessArgs {
     /// --close-pairs
     #[arg(long, value_enum, help_heading = "Research", hide_short_help = true)]
     pub paths: Option<PathsName>,
-    /// Distances that define the surface; `geodesic` implies --close-pairs
+    /// Metric of the kernel that defines the surface; `geodesic` implies --close-pairs
     ///
     /// Distances along the graph keep close sheets apart. With the geodesic kernel, contacts are
     /// certified, but separations are not.

@@ -24,8 +24,8 @@ pub struct AvatarArgs {
     pub climb: f64,
     /// Length of a step; by default a pixel's side
     ///
-    /// It is also the distance between searched places. A step is never longer than the lesser side
-    /// of the avatar's base, so that the avatar cannot pass over an obstacle.
+    /// It is also the distance between the places that the search tests. A step is never longer than
+    /// the lesser side of the avatar's base, so that the avatar cannot pass over an obstacle.
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
     pub step: Option<f64>,
 }

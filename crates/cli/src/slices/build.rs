@@ -23,9 +23,9 @@ use crate::{input, output};
 pub struct BuildArgs {
     /// Point cloud or mesh
     ///
-    /// A point cloud (PLY, PCD, LAS, LAZ, E57, NPY or text) is read in pieces, so it may be larger
-    /// than memory. The surface of a mesh (OBJ, STL, OFF, glTF, PLY with faces) is sampled so that
-    /// no pixel of it stays empty.
+    /// A point cloud (PLY, PCD, LAS, LAZ, E57, NPY or text) is read in pieces, so it may be larger than
+    /// memory. The surface of a mesh (OBJ, STL, OFF, glTF, PLY with faces) is sampled so densely that
+    /// it fills every pixel it meets.
     pub input: PathBuf,
     /// Folder for the map: new, empty, or with a map to replace
     #[arg(short, long, value_name = "DIR")]
@@ -38,7 +38,7 @@ pub struct BuildArgs {
     pub slice_height: Option<f64>,
     /// Share of a slice's height: if the points of a pixel span more, they are an obstacle
     ///
-    /// Anjos et al. 2012 use 0.07. By default, --max-slope and --noise decide.
+    /// Anjos et al. 2012 use 0.07. By default, it is computed from --max-slope and --noise.
     #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["max_slope", "noise"])]
     pub obstacle: Option<f64>,
     /// Slope above which a surface is an obstacle, in degrees
@@ -46,8 +46,8 @@ pub struct BuildArgs {
     pub max_slope: f64,
     /// Noise: the height that the points of a level floor span within a pixel
     ///
-    /// By default, it is 0 for a mesh and estimated for points. An estimate is limited, so that
-    /// points which span 90 % of a slice are an obstacle in any case.
+    /// By default, it is 0 for a mesh and estimated for points. Estimated noise alone never lets points
+    /// that span 90 % of a slice's height pass as floor.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
     /// Axis that points up: x, y, z, -x, -y or -z
@@ -68,7 +68,7 @@ pub struct BuildArgs {
     pub threads: usize,
     /// Print one JSON object instead of sentences
     ///
-    /// Its number of points includes duplicates.
+    /// The number of points in it includes duplicates.
     #[arg(long)]
     pub json: bool,
     /// Show no progress
@@ -83,7 +83,7 @@ pub struct PixelArgs {
     /// Side of a pixel, in the units of the input
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = parse_length)]
     pub pixel: Option<f64>,
-    /// Pixels along the longer side; 700 if neither is given
+    /// Pixels along the longer side of the map; 700 if neither --pixel nor --resolution is given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub resolution: Option<u32>,
 }

@@ -31,7 +31,7 @@ pub struct QueryArgs {
     /// Another map to test against this one in the poses of --poses
     #[arg(long, value_name = "DIR", requires = "poses")]
     pub map: Option<PathBuf>,
-    /// Poses of --map about the axis that points up
+    /// Poses of --map; they may rotate about the vertical axis only
     ///
     /// Each is a line `{"a":[16 numbers],"b":[16 numbers]}`, where `a` is the pose of this map
     /// (optional) and `b` that of the other.

@@ -39,10 +39,11 @@ pub struct RouteArgs {
     /// Let the avatar fall on the way
     #[arg(long)]
     pub falls: bool,
-    /// Write the route for `slices walk --route`, with the same avatar, climb and step
+    /// Write the route for `slices walk --route`, which then needs the same --avatar, --climb and
+    /// --step
     #[arg(short, long, value_name = "ROUTE.json")]
     pub output: Option<PathBuf>,
-    /// Draw the walk along the route, as PNG; without a route, the places within reach
+    /// Draw the walk along the route, or, if there is no route, the places within reach, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
     /// Print one JSON object instead of a sentence

@@ -14,27 +14,27 @@ pub struct TouchArgs {
     pub scan: PathBuf,
     /// Shapes in world units, one JSON object on each line; `-` reads standard input
     ///
-    /// `{"sphere":{"centre":[x,y,z],"radius":r}}`,
+    /// The forms are `{"sphere":{"centre":[x,y,z],"radius":r}}`,
     /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}`, `{"box":{"pose":[16, 12 or 7
-    /// numbers],"half":[x,y,z]}}`, `{"cylinder":{"pose":[…],"half_height":h,"radius":r}}` about the y
-    /// axis of its pose, `{"cone":{…}}` with the same fields and its tip
-    /// at +y,
-    /// `{"hull":{"points":[[x,y,z],…]}}`, `{"triangle":{"points":[…]}}` or
-    /// `{"segment":{"points":[…]}}`. A `radius` also rounds boxes, hulls, triangles and segments;
+    /// numbers],"half":[x,y,z]}}`, `{"cylinder":{"pose":[…],"half_height":h,"radius":r}}`,
+    /// `{"cone":{…}}`, `{"hull":{"points":[[x,y,z],…]}}`, `{"triangle":{"points":[…]}}` and
+    /// `{"segment":{"points":[…]}}`. A cylinder's axis is the y axis of its pose; a cone has the same
+    /// fields, and its tip is at +y. A `radius` also rounds boxes, hulls, triangles and segments;
     /// `rounding` rounds cylinders and cones. Each shape gets one line of output, in order.
     #[arg(long, value_name = "FILE.jsonl")]
     pub shapes: PathBuf,
     /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose: Option<String>,
-    /// Test the surface between the points as well, and report bounds of the distance and contacts
+    /// Also test the surface between the points, and report contacts and bounds of the distance
     ///
     /// Shapes are tested against the obstacle: tangent discs where points sample a sheet, small balls
-    /// about all other points. Normals of contacts point outwards if the scan is
-    /// oriented (`preprocess --graph`), otherwise to the side of the shape's centre.
+    /// about all other points. Contact normals point outwards if the scan is oriented (`preprocess
+    /// --graph`), otherwise to the side on which the shape's centre lies.
     #[arg(long)]
     pub surface: bool,
-    /// Test balls of this radius about the points instead, with the same report
+    /// Test against balls of this radius about the points instead of the surface, with the same report
+    /// as --surface
     #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = parse_radius)]
     pub thickened: Option<f64>,
     /// Shapes within this distance of the surface touch it; needs --surface or --thickened
@@ -43,7 +43,7 @@ pub struct TouchArgs {
     /// Threads to prepare a raw input; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
     pub threads: Option<usize>,
-    /// Check prepared scans in full before use: checksums, and every number
+    /// Check prepared scans in full before use: checksums and all values
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
     /// Print one JSON object for each shape
