@@ -65,6 +65,7 @@ pub struct Target<'a> {
 
 impl<'a> Target<'a> {
     /// A target with the meaning of `plan`.
+    #[inline]
     #[must_use]
     pub fn new(scan: Placed<'a>, plan: &ShapePlan) -> Self {
         Self { elements: Elements::new(scan, plan), is_proper: is_proper(scan.stored_to_world()) }

@@ -203,7 +203,7 @@ fn hit(
     let side = |normal: Vector| {
         if placed.scan().is_oriented() && normal.dot(&disc.normal) < 0.0 { -normal } else { normal }
     };
-    let is_wanted = elements.plan.options().detail == Detail::Witness && placed.verifies();
+    let is_wanted = elements.detail == Detail::Witness && placed.verifies();
     if is_wanted
         && let Some((t, point, normal, evidence)) = refined(elements, ray, (i, t, towards), scratch)
         && (beside <= 1.0 || evidence == Evidence::Certified)

@@ -106,7 +106,7 @@ pub(crate) fn contacts(
             other.away_sq = other.away_sq.min(away.norm_squared());
         }
     }
-    let is_refined = elements.plan.options().detail == Detail::Witness && elements.placed.verifies();
+    let is_refined = elements.detail == Detail::Witness && elements.placed.verifies();
     if let Some(solid) = solid.filter(|_| is_refined) {
         let inside = own.unwrap_or(solid.inside);
         for (n, (contact, i)) in contacts.iter_mut().zip(points).enumerate() {

@@ -8,7 +8,7 @@ use nearmiss_hierarchy::{LeafBlock, NodeGrid, Part, SLAB, ScanArrays, Starts, TH
 use nearmiss_lanes::wide::bits;
 
 use crate::ask::answer::Evidence;
-use crate::ask::options::Semantics;
+use crate::ask::options::{Detail, Semantics};
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::pair::placed::Placed;
 use crate::solid::core::{Gap, Solid};
@@ -38,7 +38,8 @@ pub(crate) struct Elements<'a> {
     pub(crate) arrays: ScanArrays<'a>,
     /// The nodes near each place, if the scan has a shape index and the obstacle or points count.
     pub(crate) nodes: Option<&'a NodeGrid>,
-    pub(crate) plan: ShapePlan,
+    /// The detail of contacts.
+    pub(crate) detail: Detail,
     pub(crate) semantics: Semantics,
     /// The margin in the stored frame.
     pub(crate) margin: f64,
@@ -76,6 +77,7 @@ pub(crate) struct Parts<S: Simd> {
 }
 
 impl<'a> Elements<'a> {
+    #[inline]
     pub(crate) fn new(placed: Placed<'a>, plan: &ShapePlan) -> Self {
         let arrays = placed.scan().arrays();
         let options = plan.options();
@@ -92,7 +94,7 @@ impl<'a> Elements<'a> {
             placed,
             arrays,
             nodes: placed.shapes().and_then(|index| index.nodes.as_deref()).filter(|_| is_listed),
-            plan: *plan,
+            detail: options.detail,
             semantics: options.semantics,
             margin: options.margin / scale,
             thickened,

@@ -58,7 +58,7 @@ pub(crate) fn touch(
     if starts.is_empty() {
         return separated(elements.of_separation(false));
     }
-    let detail = elements.plan.options().detail;
+    let detail = elements.detail;
     let mut near = Near::new(elements, solid, elements.certifies);
     near.limit(elements.margin);
     let (met, certified) = ([None; TRIES], None);
