@@ -3,7 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::repository::{Outcome, cargo, members, root, run_cargo};
+use crate::repository::{Outcome, cargo, members, root, run, run_cargo};
 use crate::{integrations, tidy};
 
 type Check = fn() -> Outcome;
@@ -40,7 +40,7 @@ pub(crate) fn run_named(names: &[&str]) -> Outcome<Vec<(&'static str, Duration)>
     Ok(times)
 }
 
-pub(crate) fn run(names: &[&str]) -> Outcome {
+pub(crate) fn run_and_report(names: &[&str]) -> Outcome {
     let times = run_named(names)?;
     for (name, time) in &times {
         println!("{name:12} {:6.1} s", time.as_secs_f64());
@@ -54,21 +54,24 @@ fn now() -> Instant {
     Instant::now()
 }
 
-/// Builds and runs a release program, which `package` chooses, with these arguments.
-fn run_program(package: &[&str], words: &[&str]) -> Outcome {
-    run_cargo(&[&["run", "--release", "--quiet"], package, &["--"], words].concat())
-}
-
 /// Checks the output of `collide --prove` with these arguments of `check-proof`.
 pub(crate) fn check_proof(words: &[&str]) -> Outcome {
-    run_program(&["-p", "check-proof"], words)
+    run_cargo(&[&["run", "--release", "--quiet", "-p", "check-proof", "--"], words].concat())
+}
+
+/// Returns a command of a release program that is built already, beside this one.
+fn beside(name: &str) -> Outcome<Command> {
+    let program = format!("{name}{}", std::env::consts::EXE_SUFFIX);
+    Ok(Command::new(std::env::current_exe()?.with_file_name(program)))
 }
 
 /// Verifies answers, counts and shapes with known answers; then the proofs of a scan near itself.
 fn verify() -> Outcome {
-    // Without rivals that take long to compile.
-    let package = ["-p", "nearmiss-benches", "--no-default-features", "--bin", "verify"];
-    run_program(&package, &["--quick"])?;
+    // Together, since they then share the libraries; without rivals that take long to compile.
+    let packages = ["-p", "nearmiss-benches", "-p", "check-proof", "--no-default-features"];
+    let programs = ["--bin", "verify", "--bin", "check-proof"];
+    run_cargo(&[&["build", "--release", "--quiet"][..], &packages, &programs].concat())?;
+    run(beside("verify")?.arg("--quick"), "verify")?;
     let folder = root().join("target").join("proofs");
     std::fs::create_dir_all(&folder)?;
     let path = |name: &str| folder.join(name).to_string_lossy().into_owned();
@@ -80,17 +83,17 @@ fn verify() -> Outcome {
         &["collide", &scan, &scan, "--poses", &poses, "--prove", &proof, "--json"],
     ] {
         // This program has the commands of `nearmiss`; building that as well would take a minute.
-        let mut command = Command::new(std::env::current_exe()?);
-        crate::repository::run(command.args(words).stdout(Stdio::null()), "nearmiss")?;
+        run(Command::new(std::env::current_exe()?).args(words).stdout(Stdio::null()), "nearmiss")?;
     }
-    check_proof(&[&proof, &scan, &scan, "--poses", &poses, "--points", "100000"])
+    let words = [&proof, &scan, &scan, "--poses", &poses, "--points", "100000"];
+    run(beside("check-proof")?.args(words), "check-proof")
 }
 
 /// Builds the published docs, whose links must not lead to private items.
 fn docs() -> Outcome {
     let mut command = cargo();
     command.args(["doc", "--workspace", "--no-deps", "--quiet"]).env("RUSTDOCFLAGS", "-D warnings");
-    crate::repository::run(&mut command, "cargo doc")
+    run(&mut command, "cargo doc")
 }
 
 /// Lints the published libraries without features; then the one that users add, with its default
@@ -124,7 +127,7 @@ fn determinism() -> Outcome {
             let mut command = Command::new(program);
             command.arg("preprocess").arg(&scan).arg("-o").arg(&file);
             command.args(["--threads", threads, "--quiet", "--json"]).stdout(Stdio::null());
-            crate::repository::run(&mut command, "nearmiss preprocess")?;
+            run(&mut command, "nearmiss preprocess")?;
             files.push((format!("{build}, {threads} threads"), std::fs::read(&file)?));
         }
     }

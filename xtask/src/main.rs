@@ -131,8 +131,8 @@ fn main() -> ExitCode {
             Ok(())
         }
         ["demo"] => demo::run(),
-        ["tidy"] => checks::run(&["tidy"]),
-        ["ci"] => checks::run(&[]),
+        ["tidy"] => checks::run_and_report(&["tidy"]),
+        ["ci"] => checks::run_and_report(&[]),
         ["check-proof", words @ ..] => checks::check_proof(words),
         ["field", ..] => field::run(std::env::args_os().skip(1)),
         ["geodesic", words @ ..] => geodesic::run(words),
@@ -143,7 +143,7 @@ fn main() -> ExitCode {
         ["c-library", words @ ..] => integrations::c_library(words),
         ["fuzz", words @ ..] => fuzz::run(words),
         ["tables", words @ ..] => tables::run(words),
-        ["test", names @ ..] => checks::run(names),
+        ["test", names @ ..] => checks::run_and_report(names),
         _ => return nearmiss_cli::run(std::env::args_os()),
     };
     match outcome {
