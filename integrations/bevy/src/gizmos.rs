@@ -1,6 +1,6 @@
 //! Pictures of scans and their contacts.
 
-use bevy_app::{App, Last, Plugin};
+use bevy_app::{App, Plugin, PostUpdate};
 use bevy_color::Color;
 use bevy_ecs::prelude::*;
 use bevy_gizmos::gizmos::Gizmos;
@@ -8,6 +8,7 @@ use bevy_math::Vec3;
 
 use crate::collider::ScanWorld;
 use crate::contact::ScanContact;
+use crate::plugin::ScanSystems;
 
 /// Draws the scan of an entity: some of its points, each as a short line along its normal.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
@@ -32,7 +33,8 @@ pub struct ScanGizmosPlugin;
 
 impl Plugin for ScanGizmosPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(Last, (draw_scans, draw_contacts));
+        // Bevy collects what is drawn in `Last`.
+        app.add_systems(PostUpdate, (draw_scans, draw_contacts).after(ScanSystems));
     }
 }
 

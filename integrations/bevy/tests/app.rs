@@ -294,3 +294,33 @@ fn answers_equal_those_of_the_library() {
     let seen = [meets, hits, touches, nears];
     assert!(seen.iter().all(|&it| (100..1000).contains(&it)), "meets, hits, touches, nears: {seen:?}");
 }
+
+#[cfg(feature = "gizmos")]
+#[test]
+fn scans_and_contacts_are_drawn() {
+    use bevy_gizmos::{GizmoAsset, GizmoPlugin};
+    use nearmiss_bevy::{ScanGizmos, ScanGizmosPlugin};
+
+    let mut app = app(Path::new("."));
+    app.add_plugins((GizmoPlugin, ScanGizmosPlugin));
+    let floor = floor();
+    let lies = spawn(&mut app, &floor, Transform::IDENTITY);
+    app.world_mut().entity_mut(lies).insert(ScanGizmos { points: 100, ..ScanGizmos::default() });
+    let count = |app: &mut App| {
+        app.update();
+        let drawn = app.world().resource::<Assets<GizmoAsset>>();
+        drawn.iter().map(|(_, asset)| asset.buffer().buffer().list_positions.len()).sum::<usize>()
+    };
+    // Lines have two ends.
+    let scan = count(&mut app);
+    assert!((100..=200).contains(&scan), "at most 100 lines, got {scan} ends");
+    let stands = Transform::from_rotation(Quat::from_rotation_x(1.5));
+    spawn(&mut app, &floor, stands);
+    let points: usize = {
+        let with_contacts = count(&mut app);
+        let points = contacts(&mut app).iter().map(|contact| contact.points.len()).sum();
+        assert_eq!(with_contacts, scan + 2 * points, "a line for each point of contact");
+        points
+    };
+    assert!(points > 0, "they touch");
+}

@@ -125,7 +125,7 @@ impl ScanShape {
         &self.0.pose
     }
 
-    /// What counts as the scan.
+    /// The part of the scan that counts.
     pub(crate) fn semantics(&self) -> Semantics {
         self.0.options.semantics
     }
