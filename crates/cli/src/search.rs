@@ -118,8 +118,8 @@ pub enum OrderName {
     Depth,
     /// Pairs whose boxes overlap most come first
     Overlap,
-    /// Pairs with most sample points on both sides of the other surface come first (Klein & Zachmann
-    /// 2004, section 5.2)
+    /// Pairs come first in which each side of the surface of B has many sample points of A (Klein &
+    /// Zachmann 2004, section 5.2)
     Sides,
     /// As `sides`, with sample points weighted by the eigenvalue gap (Klein & Zachmann 2004, section 7)
     SidesByGap,

@@ -27,8 +27,9 @@ pub struct ViewArgs {
     /// Direction from which the picture is taken, in degrees
     ///
     /// With this option, the default of --up is z. The azimuth is counted anticlockwise as seen from
-    /// above. Azimuth 0 looks from +x and 90 from +y; with --up y from +z and +x, with --up x from +y
-    /// and +z. Elevation 0 is a view from the side, 90 from above.
+    /// above. With --up z, azimuth 0 looks from +x and 90 from +y; with --up y, 0 looks from +z and 90
+    /// from +x; with --up x, 0 looks from +y and 90 from +z. Elevation 0 is a view from the side, 90
+    /// from above.
     #[arg(
         long,
         value_name = "AZIMUTH,ELEVATION",

@@ -8,9 +8,10 @@ use thiserror::Error;
 
 use crate::avatar::Avatar;
 use crate::map::{SliceMap, Unloaded};
+use crate::reach::Reach;
 use crate::route::Route;
 use crate::smooth::{length, smoothed};
-use crate::standing::StartError;
+use crate::standing::{Standing, StartError};
 use crate::steps::{Edge, Steps};
 use crate::walk::Walker;
 use crate::walk_error::WalkError;
@@ -37,7 +38,8 @@ pub enum RouteError {
     /// The avatar cannot stand at the start.
     #[error("start {0}")]
     Start(StartError),
-    /// The avatar cannot stand at the goal.
+    /// The avatar cannot stand at the goal. The nearest place that the error names is within reach of
+    /// the start.
     #[error("goal {0}")]
     Goal(StartError),
     /// The goal is out of reach.
@@ -105,7 +107,10 @@ impl Route {
         told: &mut dyn FnMut(usize),
     ) -> Result<FoundRoute, RouteError> {
         let start = avatar.placed(map, from).map_err(RouteError::Start)?;
-        let goal = avatar.placed(map, to).map_err(RouteError::Goal)?;
+        let goal = match avatar.placed(map, to) {
+            Ok(goal) => goal,
+            Err(cause) => return Err(RouteError::Goal(with_reach(map, &start, cause, falls, told)?)),
+        };
         let mut search = Search::new(map, &start, goal, falls)?;
         search.run(told)?;
         let grid = map.grid();
@@ -128,6 +133,26 @@ impl Route {
             visited: search.steps.nodes().len(),
         })
     }
+}
+
+/// The error of a goal, with the nearest place that the avatar can walk to from `start`. The nearest
+/// place to stand may be the top of a wall.
+fn with_reach(
+    map: &SliceMap,
+    start: &Walker,
+    error: StartError,
+    falls: bool,
+    told: &mut dyn FnMut(usize),
+) -> Result<StartError, WalkError> {
+    let StartError::Misplaced { place, cause, .. } = error else { return Ok(error) };
+    let reach = Reach::new_watched(map, start, falls, told)?;
+    let all = std::iter::once(start.position(map.grid())).chain(reach.positions());
+    let standing = all.map(|position| {
+        let [x, y, z] = [0, 1, 2].map(|k| position[k] - place[k]);
+        Standing { position, distance: x.hypot(y).hypot(z) }
+    });
+    let nearest = standing.min_by(|a, b| a.distance.total_cmp(&b.distance));
+    Ok(StartError::Misplaced { place, cause, nearest })
 }
 
 /// The absence of a node before.

@@ -54,8 +54,7 @@ pub struct MeshCollideArgs {
     /// answers `undecided` (Klein & Zachmann 2003).
     #[arg(long, value_name = "P", value_parser = parse_probability, conflicts_with = "all", help_heading = "Budget and evidence")]
     pub p_min: Option<f64>,
-    /// Number of node pairs with at least the probability --p-min at which the search stops [default:
-    /// 3]
+    /// The search stops when this many node pairs have at least the probability --p-min [default: 3]
     #[arg(long, value_name = "K", requires = "p_min", value_parser = parse_pairs, help_heading = "Budget and evidence")]
     pub k_min: Option<u32>,
     /// Threads; 0 for all cores

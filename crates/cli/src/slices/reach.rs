@@ -24,7 +24,7 @@ pub struct ReachArgs {
     /// Folder of the map
     pub folder: PathBuf,
     /// Place of the feet, at most --climb above or below something that supports the avatar
-    #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
+    #[arg(long, visible_alias = "from", value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
     pub start: Spot,
     /// The avatar
     #[command(flatten)]

@@ -51,6 +51,16 @@ pub(super) fn refused(path: &Path, cause: &WalkError) -> CliError {
 pub(super) fn no_route(path: &Path, grid: &Grid, cause: &RouteError) -> CliError {
     match cause {
         RouteError::Start(cause) => misplaced(path, "start", grid, cause),
+        RouteError::Goal(StartError::Misplaced { place, cause, nearest: Some(nearest) }) => {
+            let [place, reached] = [*place, nearest.position].map(|place| told_place(place, grid));
+            CliError::UnsuitableFile {
+                path: path.to_owned(),
+                what: format!(
+                    "goal {place} {cause}; nearest place within reach of the start: {reached}, {} away",
+                    short(nearest.distance)
+                ),
+            }
+        }
         RouteError::Goal(cause) => misplaced(path, "goal", grid, cause),
         RouteError::NoRoute { from, to, nearest, away } => {
             let [from, to, nearest] = [*from, *to, *nearest].map(|place| told_place(place, grid));

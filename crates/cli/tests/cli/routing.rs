@@ -121,6 +121,23 @@ fn a_route_is_found_and_walked_without_a_stop() {
 }
 
 #[test]
+fn the_place_that_is_proposed_for_a_goal_is_within_reach() {
+    let place = with_house();
+    // In the wall of the stairs, above the floor, and upstairs with a climb too low for the stairs.
+    for (goal, climb) in [("9,6.5,0.1", "0.35"), ("3,6,1.5", "0.35"), ("10,8,4", "0.1")] {
+        let route = ["slices", "route", "house", "--from", "3,6,0.1", "--climb", climb, "--to"];
+        let done = place.run(&[&route[..], &[goal]].concat());
+        assert_eq!(done.status, 1, "{goal}: {}", done.errors);
+        let told = done.errors.split_once("nearest place within reach of the start: ").map(|it| it.1);
+        let (proposed, _) =
+            told.and_then(|it| it.split_once("], ")).unwrap_or_else(|| panic!("{}", done.errors));
+        let proposed = format!("{proposed}]");
+        let people = place.ok(&[&route[..], &[&proposed]].concat()).results;
+        assert!(people.starts_with("A route of "), "{goal}: {proposed}: {people}");
+    }
+}
+
+#[test]
 fn where_there_is_no_route_that_is_told() {
     let place = with_house();
     let route = ["slices", "route", "house", "--from", "3,6,0.1"];

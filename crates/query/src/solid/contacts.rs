@@ -238,17 +238,21 @@ impl Gather<'_, '_> {
                 let out = self.way_out(i, &disc);
                 let is_edge = elements.placed.scan().kind(i) == PointKind::Edge;
                 let is_behind = out.dot(&(self.inside - disc.centre)) < 0.0;
-                let place = if solid.crosses(&disc) {
+                let crosses = solid.crosses(&disc);
+                let near = if crosses { None } else { gap() };
+                let place = if crosses {
                     Some(deepest(solid, &disc, out))
                 } else {
-                    gap().and_then(|gap| of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)))
+                    near.as_ref().and_then(|gap| of_disc(solid, gap, &disc, (out, is_edge, elements.margin)))
                 };
                 // The part of the shape over the disc may be far above it, while another part is at the rim.
                 let least = -elements.margin.max(f64::from(THICKNESS) * disc.radius);
                 let place = place.filter(|it| it.2 >= least);
                 is_beside = place.is_none();
-                let place =
-                    place.or_else(|| gap().map(|gap| (gap.on_disc, out, solid.radius - gap.distance)));
+                let place = place.or_else(|| {
+                    let near = if crosses { gap() } else { near };
+                    near.map(|gap| (gap.on_disc, out, solid.radius - gap.distance))
+                });
                 place.map(|it| (it, is_behind))
             }
         };
