@@ -75,12 +75,19 @@ impl<T: Pod> Array<T> {
 impl<T: Pod> Deref for Array<T> {
     type Target = [T];
 
+    #[inline]
     fn deref(&self) -> &[T] {
         match &self.backing {
             Backing::Owned(elements) => elements,
-            Backing::InPlace { bytes, range } => bytemuck::cast_slice(&bytes.as_slice()[range.clone()]),
+            Backing::InPlace { bytes, range } => elements_of(bytes, range),
         }
     }
+}
+
+/// Returns the elements in a range of bytes. A function of its own, so that callers inline the
+/// rest.
+fn elements_of<'b, T: Pod>(bytes: &'b Bytes, range: &Range<usize>) -> &'b [T] {
+    bytemuck::cast_slice(&bytes.as_slice()[range.clone()])
 }
 
 impl<T> Clone for Array<T> {

@@ -28,7 +28,9 @@ pub(crate) struct Row {
     pub(crate) support_radius: [f32; HALF],
     /// 1/h²; infinite in unused lanes.
     pub(crate) decay: [f32; HALF],
-    /// The weights of the points in the last evaluation.
+    /// The places of the points relative to that of the last evaluation.
+    pub(crate) from: [[f32; HALF]; 3],
+    /// d²/h² of the points there, then their weights.
     pub(crate) weights: [f32; HALF],
 }
 

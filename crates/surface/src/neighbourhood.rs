@@ -8,7 +8,7 @@ use fearless_simd::{
 
 use nearmiss_index::PointBlock;
 
-use crate::SurfacePlan;
+use crate::{Kernel, SurfacePlan};
 use crate::gathered::{Gathered, HALF, half_of};
 
 /// Weighted sums over a neighbourhood, relative to the point x for which they were taken.
@@ -223,23 +223,27 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         }
     }
 
-    /// Adds gathered points, as [`Self::offer_all`] adds those of blocks. Their weights are
-    /// computed first, so that the constants of the kernel and the sums do not compete for
-    /// registers.
+    /// Adds gathered points, as [`Self::offer_all`] adds those of blocks, in the same passes.
     #[inline(always)]
     pub fn offer_gathered(&mut self, simd: S, points: &mut Gathered) {
-        let rows = points.rows();
+        let (kernel, reach_sq) = (self.plan.kernel(), self.plan.reach_sq());
+        let (rows, load) = (points.rows(), f32x8::load_array_ref);
         for row in &mut *rows {
             let [x, y, z] = self.relative(simd, [&row.position[0], &row.position[1], &row.position[2]]);
-            let t = (x * x + y * y + z * z) * f32x8::load_array_ref(simd, &row.decay);
-            let counts: mask32x8<S> = t.simd_lt(self.plan.reach_sq());
+            let t = (x * x + y * y + z * z) * load(simd, &row.decay);
+            let counts: mask32x8<S> = t.simd_lt(reach_sq);
             self.support += counts.to_bitmask().count_ones();
-            row.weights = self.weights(simd, t).to_array();
+            self.nearest = self.nearest.min(t);
+            row.from = [x.to_array(), y.to_array(), z.to_array()];
+            row.weights = t.to_array();
+        }
+        for row in &mut *rows {
+            let t = load(simd, &row.weights);
+            row.weights = weights(simd, kernel, reach_sq, t).to_array();
         }
         for row in rows {
-            let place = self.relative(simd, [&row.position[0], &row.position[1], &row.position[2]]);
-            let support_radius = f32x8::load_array_ref(simd, &row.support_radius);
-            self.add(place, support_radius, f32x8::load_array_ref(simd, &row.weights));
+            let from = [load(simd, &row.from[0]), load(simd, &row.from[1]), load(simd, &row.from[2])];
+            self.add(from, load(simd, &row.support_radius), load(simd, &row.weights));
         }
     }
 
@@ -287,9 +291,8 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// Returns the weights of points with these d²/h²; zero for points too far from x.
     #[inline(always)]
     fn weights(&mut self, simd: S, t: f32x8<S>) -> f32x8<S> {
-        let counts: mask32x8<S> = t.simd_lt(self.plan.reach_sq());
         self.nearest = self.nearest.min(t);
-        simd.select_f32x8(counts, self.plan.kernel().weights(simd, t), f32x8::simd_from(simd, 0.0))
+        weights(simd, self.plan.kernel(), self.plan.reach_sq(), t)
     }
 
     /// Adds the points of half a block, given their weights.
@@ -344,6 +347,13 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let (first, second) = ([x, y, z], [xx, xy, xz, yy, yz, zz]);
         Moments { weight, first, second, support_radius, nearest, support: self.support }
     }
+}
+
+/// Returns the weights of points with these d²/h²; zero for points too far away.
+#[inline(always)]
+fn weights<S: Simd>(simd: S, kernel: Kernel, reach_sq: f32, t: f32x8<S>) -> f32x8<S> {
+    let counts: mask32x8<S> = t.simd_lt(reach_sq);
+    simd.select_f32x8(counts, kernel.weights(simd, t), f32x8::simd_from(simd, 0.0))
 }
 
 /// Returns the sum over the lanes of each register. The halves are added first, then the last four
