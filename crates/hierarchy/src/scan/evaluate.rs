@@ -139,6 +139,7 @@ impl PointHierarchy {
         self.evaluate_with(x, &mut GatherScratch::default())
     }
 
+    #[inline(always)]
     pub(crate) fn index(&self) -> Index<'_> {
         Index {
             tree: self.tree(),
