@@ -180,6 +180,7 @@ impl Evaluation {
     /// Orients n to the side of `sum`, a weighted sum of oriented normals with total weight
     /// `total`. The status becomes ambiguous if these normals disagree, that is if |`sum`| <
     /// `total` / 2.
+    #[inline]
     #[must_use]
     pub fn turned_to(self, sum: [f64; 3], total: f64) -> Self {
         let sum = Vector3::from(sum);

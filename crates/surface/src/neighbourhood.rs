@@ -8,7 +8,8 @@ use fearless_simd::{
 
 use nearmiss_index::PointBlock;
 
-use crate::SurfacePlan;
+use crate::{Kernel, SurfacePlan};
+use crate::gathered::{Gathered, HALF, half_of};
 
 /// Weighted sums over a neighbourhood, relative to the point x for which they were taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -132,10 +133,6 @@ pub struct HalfBlock {
     id: u32,
 }
 
-/// Number of points in half a block, which fills one AVX2 register. Half blocks are more often
-/// without a contributing point than blocks, and their sums fit into the available registers.
-const HALF: usize = WIDTH / 2;
-
 /// Running sums over the points that have x within their support radius.
 ///
 /// A point adds to the lane of its index modulo 8; points too far from x add zero. Blocks come in
@@ -180,8 +177,8 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let (t, _) = self.distances(simd, block);
         let (low, high) = simd.split_f32x16(t);
         let (low, high) = (self.weights(simd, low), self.weights(simd, high));
-        self.add(simd, block, 0, low);
-        self.add(simd, block, 1, high);
+        self.add_half(simd, block, 0, low);
+        self.add_half(simd, block, 1, high);
     }
 
     /// Adds the blocks with indices `supporting`, ascending, as [`Self::offer`] does. `halves` is
@@ -221,8 +218,32 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         }
         for half in &halves[..count] {
             if let Some(block) = blocks.get(half.id as usize / 2) {
-                self.add(simd, block, half.id as usize % 2, f32x8::load_array_ref(simd, &half.lanes));
+                self.add_half(simd, block, half.id as usize % 2, f32x8::load_array_ref(simd, &half.lanes));
             }
+        }
+    }
+
+    /// Adds gathered points, as [`Self::offer_all`] adds those of blocks, in the same passes.
+    #[inline(always)]
+    pub fn offer_gathered(&mut self, simd: S, points: &mut Gathered) {
+        let (kernel, reach_sq) = (self.plan.kernel(), self.plan.reach_sq());
+        let (rows, load) = (points.rows(), f32x8::load_array_ref);
+        for row in &mut *rows {
+            let [x, y, z] = self.relative(simd, [&row.position[0], &row.position[1], &row.position[2]]);
+            let t = (x * x + y * y + z * z) * load(simd, &row.decay);
+            let counts: mask32x8<S> = t.simd_lt(reach_sq);
+            self.support += counts.to_bitmask().count_ones();
+            self.nearest = self.nearest.min(t);
+            row.from = [x.to_array(), y.to_array(), z.to_array()];
+            row.weights = t.to_array();
+        }
+        for row in &mut *rows {
+            let t = load(simd, &row.weights);
+            row.weights = weights(simd, kernel, reach_sq, t).to_array();
+        }
+        for row in rows {
+            let from = [load(simd, &row.from[0]), load(simd, &row.from[1]), load(simd, &row.from[2])];
+            self.add(from, load(simd, &row.support_radius), load(simd, &row.weights));
         }
     }
 
@@ -239,8 +260,8 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let nearest = self.nearest.min(low.min(high));
         let (low, high) = simd.split_f32x16(t);
         let (low, high) = (self.weights(simd, low), self.weights(simd, high));
-        self.add(simd, &block.points, 0, low);
-        self.add(simd, &block.points, 1, high);
+        self.add_half(simd, &block.points, 0, low);
+        self.add_half(simd, &block.points, 1, high);
         (self.nearest, self.support) = (nearest, support);
     }
 
@@ -270,23 +291,33 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// Returns the weights of points with these d²/h²; zero for points too far from x.
     #[inline(always)]
     fn weights(&mut self, simd: S, t: f32x8<S>) -> f32x8<S> {
-        let counts: mask32x8<S> = t.simd_lt(self.plan.reach_sq());
         self.nearest = self.nearest.min(t);
-        simd.select_f32x8(counts, self.plan.kernel().weights(simd, t), f32x8::simd_from(simd, 0.0))
+        weights(simd, self.plan.kernel(), self.plan.reach_sq(), t)
     }
 
     /// Adds the points of half a block, given their weights.
     #[inline(always)]
-    fn add(&mut self, simd: S, block: &PointBlock, half: usize, w: f32x8<S>) {
-        let load = |lanes: &[f32; WIDTH]| {
-            let halves: &[[f32; HALF]; 2] = bytemuck::cast_ref(lanes);
-            f32x8::load_array_ref(simd, &halves[half])
-        };
-        let [px, py, pz] = &block.position;
+    fn add_half(&mut self, simd: S, block: &PointBlock, half: usize, w: f32x8<S>) {
+        let [x, y, z] = &block.position;
+        let place = self.relative(simd, [half_of(x, half), half_of(y, half), half_of(z, half)]);
+        let support_radius = f32x8::load_array_ref(simd, half_of(&block.support_radius, half));
+        self.add(place, support_radius, w);
+    }
+
+    /// Returns the places of points relative to x.
+    #[inline(always)]
+    fn relative(&self, simd: S, [px, py, pz]: [&[f32; HALF]; 3]) -> [f32x8<S>; 3] {
         let (high, low) = (self.high, self.low);
-        let x = (load(px) - high[0]) - low[0];
-        let y = (load(py) - high[1]) - low[1];
-        let z = (load(pz) - high[2]) - low[2];
+        [
+            (f32x8::load_array_ref(simd, px) - high[0]) - low[0],
+            (f32x8::load_array_ref(simd, py) - high[1]) - low[1],
+            (f32x8::load_array_ref(simd, pz) - high[2]) - low[2],
+        ]
+    }
+
+    /// Adds points at `x`, `y`, `z` relative to the centre, given their weights.
+    #[inline(always)]
+    fn add(&mut self, [x, y, z]: [f32x8<S>; 3], support_radius: f32x8<S>, w: f32x8<S>) {
         let (wx, wy, wz) = (w * x, w * y, w * z);
         self.weight += w;
         self.first[0] += wx;
@@ -298,7 +329,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         self.second[3] += wy * y;
         self.second[4] += wy * z;
         self.second[5] += wz * z;
-        self.support_radius += w * load(&block.support_radius);
+        self.support_radius += w * support_radius;
     }
 
     /// Returns the sums over all lanes.
@@ -316,6 +347,13 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let (first, second) = ([x, y, z], [xx, xy, xz, yy, yz, zz]);
         Moments { weight, first, second, support_radius, nearest, support: self.support }
     }
+}
+
+/// Returns the weights of points with these d²/h²; zero for points too far away.
+#[inline(always)]
+fn weights<S: Simd>(simd: S, kernel: Kernel, reach_sq: f32, t: f32x8<S>) -> f32x8<S> {
+    let counts: mask32x8<S> = t.simd_lt(reach_sq);
+    simd.select_f32x8(counts, kernel.weights(simd, t), f32x8::simd_from(simd, 0.0))
 }
 
 /// Returns the sum over the lanes of each register. The halves are added first, then the last four

@@ -11,7 +11,7 @@ use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::vector::{dot, sub};
-use nearmiss_surface::{Centre, Evaluation, HalfBlock, Neighbourhood, SurfacePlan};
+use nearmiss_surface::{Centre, Evaluation, Gathered, HalfBlock, Neighbourhood, SurfacePlan};
 
 use crate::descent::PlaceVisitor;
 use crate::tree::wide::{Siblings, Tree};
@@ -48,6 +48,8 @@ pub struct GatherScratch {
     supporting: Vec<u32>,
     /// Intermediate values of half blocks.
     halves: Vec<HalfBlock>,
+    /// The points that support positions near a place.
+    gathered: Gathered,
 }
 
 impl Default for GatherScratch {
@@ -61,7 +63,14 @@ impl GatherScratch {
     /// affect results.
     #[must_use]
     pub fn at(level: Level) -> Self {
-        Self { level, block: 0, found: Vec::new(), supporting: Vec::new(), halves: Vec::new() }
+        Self {
+            level,
+            block: 0,
+            found: Vec::new(),
+            supporting: Vec::new(),
+            halves: Vec::new(),
+            gathered: Gathered::default(),
+        }
     }
 }
 
@@ -92,18 +101,50 @@ impl<'a> Index<'a> {
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
         let count = self.list_supporting(centre.rounded(), 0.0, scratch);
-        self.evaluate_by(x, &centre, count, scratch)
+        let GatherScratch { level, supporting, halves, .. } = scratch;
+        dispatch!(*level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut near = Neighbourhood::new(simd, self.plan, &centre);
+                near.offer_all(simd, self.blocks, &supporting[..count], halves);
+                near.moments(simd).evaluate(self.plan, x)
+            },
+        ))
+    }
+
+    /// Gathers the points that support positions within `distance` of `place`.
+    pub(crate) fn gather(&self, place: [f32; 3], distance: f32, scratch: &mut GatherScratch) {
+        let count = self.list_supporting(place, distance * GROWN, scratch);
+        let GatherScratch { level, supporting, gathered, .. } = scratch;
+        dispatch!(*level, simd => simd.vectorize(
+            #[inline(always)]
+            || gathered.gather(simd, self.plan, (self.blocks, &supporting[..count]), place, distance),
+        ));
+    }
+
+    /// Evaluates f at `x`, which is `centre`, from the points gathered last.
+    #[inline]
+    pub(crate) fn evaluate_gathered(
+        &self,
+        x: [f64; 3],
+        centre: &Centre,
+        scratch: &mut GatherScratch,
+    ) -> Evaluation {
+        let GatherScratch { level, gathered, .. } = scratch;
+        dispatch!(*level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut near = Neighbourhood::new(simd, self.plan, centre);
+                near.offer_gathered(simd, gathered);
+                near.moments(simd).evaluate(self.plan, x)
+            },
+        ))
     }
 
     /// Lists the blocks whose support may come within `distance` of `place` in `scratch`. Returns
     /// their number.
     #[inline]
-    pub(crate) fn list_supporting(
-        &self,
-        place: [f32; 3],
-        distance: f32,
-        scratch: &mut GatherScratch,
-    ) -> usize {
+    fn list_supporting(&self, place: [f32; 3], distance: f32, scratch: &mut GatherScratch) -> usize {
         let GatherScratch { level, block, found, supporting, .. } = scratch;
         let mut list = self.list(*block, place, distance);
         if list.is_none() {
@@ -117,26 +158,6 @@ impl<'a> Index<'a> {
         dispatch!(*level, simd => simd.vectorize(
             #[inline(always)]
             || self.supporting(simd, list, place, distance, supporting).len(),
-        ))
-    }
-
-    /// Evaluates f at `x`, which is `centre`, from the first `count` blocks listed in `scratch`.
-    #[inline]
-    pub(crate) fn evaluate_by(
-        &self,
-        x: [f64; 3],
-        centre: &Centre,
-        count: usize,
-        scratch: &mut GatherScratch,
-    ) -> Evaluation {
-        let GatherScratch { level, supporting, halves, .. } = scratch;
-        dispatch!(*level, simd => simd.vectorize(
-            #[inline(always)]
-            || {
-                let mut near = Neighbourhood::new(simd, self.plan, centre);
-                near.offer_all(simd, self.blocks, &supporting[..count], halves);
-                near.moments(simd).evaluate(self.plan, x)
-            },
         ))
     }
 

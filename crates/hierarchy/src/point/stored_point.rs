@@ -19,4 +19,6 @@ pub struct StoredPoint {
     pub ball: f32,
     /// `true` if the obstacle represents the point by the sheet that it samples.
     pub is_on_sheet: bool,
+    /// The distance from a point on a sheet up to which the surface belongs to the obstacle.
+    pub cell: f32,
 }

@@ -14,7 +14,7 @@ use xxhash_rust::xxh3::Xxh3;
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
 use crate::point::disc::DiscRadii;
-use crate::point::kind::{PointKind, is_on_sheet, obstacle_ball};
+use crate::point::kind::{PointKind, cell_radius, is_on_sheet, obstacle_ball};
 use crate::point::leaf_block::{LeafBlock, LeafParts, Leaves};
 use crate::point::stored_point::StoredPoint;
 use crate::scan::arrays::ScanArrays;
@@ -69,7 +69,7 @@ impl PointHierarchy {
     }
 
     /// Returns the arrays that a query reads.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn arrays(&self) -> ScanArrays<'_> {
         ScanArrays {
@@ -348,6 +348,7 @@ impl PointHierarchy {
             disc: self.arrays.codes[i].disc(radius, self.meta.reach, self.meta.sampling_radius),
             ball: obstacle_ball(i, dense, kind, radius),
             is_on_sheet: is_on_sheet(i, dense, kind),
+            cell: cell_radius(radius, self.meta.reach),
         }
     }
 

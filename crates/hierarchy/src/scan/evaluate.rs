@@ -7,8 +7,8 @@ use nearmiss_surface::{Centre, Evaluation};
 use crate::point::gather::{GROUP, GROWN, GatherScratch, Index};
 use crate::scan::build::PointHierarchy;
 
-/// The distance, in local radii, up to which positions share the blocks that support them. Steps
-/// onto a surface are seldom longer; with this distance about a tenth more blocks are compared.
+/// The distance, in local radii, up to which positions share the points that support them. Steps
+/// onto a surface are seldom longer.
 const SHARED: f32 = 0.25;
 
 /// The implicit function near a stored point, for several positions. Returned by
@@ -16,13 +16,11 @@ const SHARED: f32 = 0.25;
 #[derive(Debug)]
 pub struct NearField<'a> {
     index: Index<'a>,
-    /// The supporting blocks are the first `count` in its list.
     scratch: &'a mut GatherScratch,
     margin: f32,
-    /// Blocks that support positions within a distance of `centre` are listed.
+    /// The points that support positions within a distance of `centre` are gathered in `scratch`.
     centre: [f32; 3],
     within: f32,
-    count: usize,
 }
 
 impl NearField<'_> {
@@ -30,20 +28,20 @@ impl NearField<'_> {
     pub fn evaluate(&mut self, x: [f64; 3]) -> Evaluation {
         let centre = Centre::new(x);
         let d = sub(centre.rounded(), self.centre);
-        let is_listed = dot(d, d) <= self.within * self.within && self.within >= 0.0;
-        if !is_listed {
-            self.list(centre.rounded());
+        let is_gathered = dot(d, d) <= self.within * self.within && self.within >= 0.0;
+        if !is_gathered {
+            self.gather(centre.rounded());
         }
-        self.index.evaluate_by(x, &centre, self.count, self.scratch)
+        self.index.evaluate_gathered(x, &centre, self.scratch)
     }
 
-    /// Lists the blocks that support positions near `place`.
-    fn list(&mut self, place: [f32; 3]) {
+    /// Gathers the points that support positions near `place`.
+    fn gather(&mut self, place: [f32; 3]) {
         let distance = [self.margin, 0.0]
             .into_iter()
             .find(|&distance| self.index.list(self.scratch.block, place, distance * GROWN).is_some());
         let distance = distance.unwrap_or(0.0);
-        self.count = self.index.list_supporting(place, distance * GROWN, self.scratch);
+        self.index.gather(place, distance, self.scratch);
         (self.centre, self.within) = (place, distance);
     }
 }
@@ -66,7 +64,7 @@ impl PointHierarchy {
     pub fn near<'a>(&'a self, i: usize, scratch: &'a mut GatherScratch) -> NearField<'a> {
         scratch.block = i / PointBlock::WIDTH;
         let margin = SHARED * self.arrays.radii.get(i).copied().unwrap_or(0.0);
-        NearField { index: self.index(), scratch, margin, centre: [0.0; 3], within: -1.0, count: 0 }
+        NearField { index: self.index(), scratch, margin, centre: [0.0; 3], within: -1.0 }
     }
 
     /// Like [`Self::evaluate_with`], but faster for a sequence of nearby positions along the
@@ -141,6 +139,7 @@ impl PointHierarchy {
         self.evaluate_with(x, &mut GatherScratch::default())
     }
 
+    #[inline(always)]
     pub(crate) fn index(&self) -> Index<'_> {
         Index {
             tree: self.tree(),

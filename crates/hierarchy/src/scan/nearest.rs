@@ -1,7 +1,7 @@
 //! The nearest point: from a neighbour list, or by a descent with four boxes at a time, nearest
 //! first.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
@@ -53,6 +53,22 @@ impl Nearest {
             self.best = (distance_sq, i);
             self.within = single_above(distance_sq.sqrt() + self.lost);
             self.most = (self.within * self.within).next_up();
+        }
+    }
+
+    /// Offers the points of a block in the lanes `points`, given as bits. Single precision selects
+    /// the candidates, all lanes at once.
+    #[inline(always)]
+    fn offer_block<S: Simd>(&mut self, simd: S, blocks: &[PointBlock], block: usize, points: u32) {
+        let of_block = &blocks[block];
+        let d = seen_from(simd, &of_block.position, self.rounded);
+        let near: mask32x16<S> = product(d, d).simd_le(self.most);
+        let mut left = bits(near) & points;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize % PointBlock::WIDTH;
+            left &= left - 1;
+            let [x, y, z] = &of_block.position;
+            self.offer(block * PointBlock::WIDTH + lane, [x[lane], y[lane], z[lane]]);
         }
     }
 
@@ -150,18 +166,21 @@ impl PointHierarchy {
     fn nearest_listed_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Option<u32> {
         let mut nearest = self.nearest_of_leaf(simd, i, x);
         let listed = self.index().list(i / PointBlock::WIDTH, nearest.rounded, nearest.within)?;
-        let points = 0..self.len();
+        // Taken once: an array in a file is checked at every access.
+        let (blocks, groups): (&[PointBlock], &[PointBlock]) = (&self.arrays.blocks, &self.arrays.groups);
+        let last = lanes_of(blocks.len().saturating_sub(1), &(0..self.len()));
         for &group in listed {
-            let balls = self.arrays.groups.get(group as usize)?;
+            let balls = groups.get(group as usize)?;
             let d = seen_from(simd, &balls.position, nearest.rounded);
             let reach = f32x16::load_array_ref(simd, &balls.support_radius) + nearest.within;
             let near: mask32x16<S> = product(d, d).simd_le(reach * reach * GROWN);
             let first = group as usize * PointBlock::WIDTH;
-            let mut left = bits(near) & lanes_of(group as usize, &(0..self.arrays.blocks.len()));
+            let mut left = bits(near) & lanes_of(group as usize, &(0..blocks.len()));
             while left != 0 {
                 let block = first + left.trailing_zeros() as usize;
                 left &= left - 1;
-                self.offer_block(simd, block, &points, &mut nearest);
+                let points = if block + 1 < blocks.len() { u32::MAX } else { last };
+                nearest.offer_block(simd, blocks, block, points);
             }
         }
         Some(id32(nearest.best.1))
@@ -180,22 +199,9 @@ impl PointHierarchy {
     #[inline(always)]
     fn offer_leaf<S: Simd>(&self, simd: S, leaf: usize, nearest: &mut Nearest) {
         let points = self.topology().points_of_leaf(leaf);
+        let blocks: &[PointBlock] = &self.arrays.blocks;
         for block in points.start / PointBlock::WIDTH..=(points.end - 1) / PointBlock::WIDTH {
-            self.offer_block(simd, block, &points, nearest);
-        }
-    }
-
-    /// Offers those of `points` that are in a block. Single precision selects the candidates, all
-    /// lanes at once.
-    #[inline(always)]
-    fn offer_block<S: Simd>(&self, simd: S, block: usize, points: &Range<usize>, nearest: &mut Nearest) {
-        let d = seen_from(simd, &self.arrays.blocks[block].position, nearest.rounded);
-        let near: mask32x16<S> = product(d, d).simd_le(nearest.most);
-        let mut left = bits(near) & lanes_of(block, points);
-        while left != 0 {
-            let i = block * PointBlock::WIDTH + left.trailing_zeros() as usize;
-            left &= left - 1;
-            nearest.offer(i, PointBlock::position_in(&self.arrays.blocks, i));
+            nearest.offer_block(simd, blocks, block, lanes_of(block, &points));
         }
     }
 

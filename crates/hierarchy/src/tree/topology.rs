@@ -91,7 +91,7 @@ pub struct Grandchildren {
 
 /// The nodes of a tree. Ids count inner nodes first, from the root, then leaves in the order of
 /// their points. The children of a node have consecutive ids.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Eq)]
 pub struct Topology {
     points: u32,
     leaf_size: u32,
@@ -101,6 +101,14 @@ pub struct Topology {
     bottom: u32,
     /// Binary depth of the nodes whose children are leaves.
     depth: u32,
+}
+
+/// Everything else follows from the numbers of points, in total and in a leaf.
+impl PartialEq for Topology {
+    #[inline]
+    fn eq(&self, other: &Self) -> bool {
+        self.points == other.points && self.leaf_size == other.leaf_size
+    }
 }
 
 /// The children of a node.

@@ -135,14 +135,15 @@ pub(crate) fn collide_by<'q>(
         Err(early) => return without_a_search(asked, early, meter.spent, outputs),
     };
     let by = (scratch.level, options.semantics.part());
-    let arrays = [a.scan().arrays(), b.scan().arrays()];
-    let pair = ScanPair::new([a, b], arrays.each_ref(), relative, meter, by);
+    let (arrays_a, arrays_b) = (a.scan().arrays(), b.scan().arrays());
+    let arrays = [&arrays_a, &arrays_b];
+    let pair = ScanPair::new([a, b], arrays, relative, meter, by);
     let manifold = outputs.manifold.take();
     let answer = met.unwrap_or_else(|| decide(pair, &pose, asked, scratch, outputs, look));
     match (answer.verdict, manifold) {
         (Verdict::Intersecting { contact, .. }, Some(points)) => {
             let meter = Meter::new(budget, [a, b], evaluations).after(answer.statistics);
-            let mut pair = ScanPair::new([a, b], arrays.each_ref(), relative, meter, by);
+            let mut pair = ScanPair::new([a, b], arrays, relative, meter, by);
             manifold::gather(&mut pair, options, &contact, &mut scratch.manifold, points);
             Answer { statistics: pair.meter.spent, ..answer }
         }

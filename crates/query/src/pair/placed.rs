@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{GeodesicKernel, KernelScratch, SurfaceGraph, SurfaceSamples};
-use nearmiss_hierarchy::{GatherScratch, NearField, PointHierarchy, SLAB, ScanArrays};
+use nearmiss_hierarchy::{GatherScratch, NearField, PointHierarchy, SLAB};
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Metric};
 
@@ -112,15 +112,13 @@ impl<'a> Placed<'a> {
     /// stored point and that point samples a sheet (`docs/theory/obstacle.md`).
     pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
         let x = self.stored_to_world.apply_inverse(x);
-        let nearest = self.scan.nearest_point_near(i, x) as usize;
-        let arrays = self.scan.arrays();
-        let (position, ScanArrays { normals, radii, .. }) = (arrays.position(nearest), arrays);
-        let away = [0, 1, 2].map(|k| x[k] - f64::from(position[k]));
-        let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
+        let nearest = self.scan.stored_point(self.scan.nearest_point_near(i, x) as usize);
+        let away = [0, 1, 2].map(|k| x[k] - f64::from(nearest.position[k]));
+        let height: f64 = (0..3).map(|k| away[k] * f64::from(nearest.normal[k])).sum();
         let distance_sq: f64 = away.iter().map(|d| d * d).sum();
-        let most = f64::from(arrays.cell_radius(nearest));
-        arrays.is_on_sheet(nearest)
-            && height.abs() <= f64::from(SLAB * radii[nearest])
+        let most = f64::from(nearest.cell);
+        nearest.is_on_sheet
+            && height.abs() <= f64::from(SLAB * nearest.radius)
             && distance_sq <= most * most
     }
 
@@ -216,6 +214,7 @@ impl<'a> Placed<'a> {
     }
 
     /// Converts an evaluation from the stored frame to the world.
+    #[inline]
     pub(crate) fn in_world(&self, at: Evaluation) -> Evaluation {
         let scale = self.stored_to_world.scale();
         Evaluation {

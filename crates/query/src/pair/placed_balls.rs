@@ -61,10 +61,12 @@ impl<'a> PlacedBalls<'a> {
     /// Places the `stored` balls, given in stored frames, at the poses of these frames. `None` if a
     /// pose is invalid or out of range.
     pub(crate) fn of(placed: [&'a Pose; 2], stored: [Ball; 2]) -> Option<Self> {
+        if are_comparable(placed) { Self::of_comparable(placed, stored) } else { None }
+    }
+
+    /// The same for poses that are known to be valid and in range.
+    pub(crate) fn of_comparable(placed: [&'a Pose; 2], stored: [Ball; 2]) -> Option<Self> {
         let [a, b] = placed;
-        if !are_comparable(placed) {
-            return None;
-        }
         let place =
             |pose: &Pose, ball: &Ball| (Vector3::from(pose.apply(ball.centre)), ball.radius * pose.scale());
         let ((ca, ra), (cb, rb)) = (place(a, &stored[0]), place(b, &stored[1]));

@@ -135,6 +135,6 @@ pub(crate) fn balls_apart([a, b]: [&Placed<'_>; 2], part: Part) -> f64 {
         Part::Obstacle => view.scan().outline().obstacle,
         Part::Surface => view.scan().outline().surface,
     };
-    let balls = PlacedBalls::of([a.stored_to_world(), b.stored_to_world()], [about(a), about(b)]);
-    balls.map_or(f64::NAN, |balls| balls.gap)
+    let placed = [a.stored_to_world(), b.stored_to_world()];
+    PlacedBalls::of_comparable(placed, [about(a), about(b)]).map_or(f64::NAN, |balls| balls.gap)
 }

@@ -4,3 +4,4 @@
 mod absurd;
 mod conformance;
 mod eigen;
+mod gathered;
