@@ -20,6 +20,9 @@ const GROWN: f32 = 1.0 + 1e-5;
 /// coordinate of the position.
 const ROUNDING: f32 = 1e-6;
 
+/// The number of rows for which memory is taken at first; most places need about thirty.
+const USUAL_ROWS: usize = 64;
+
 /// Half a block of points.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(64))]
@@ -60,7 +63,7 @@ impl Gathered {
     ) {
         let most = 2 * supporting.len() + 1;
         if self.rows.len() < most {
-            self.rows.resize(most, Row::default());
+            self.rows.resize(most.max(USUAL_ROWS), Row::default());
         }
         let (rows, mut count) = (&mut self.rows[..most], 0);
         let slack = place.iter().fold(distance, |slack, c| slack + ROUNDING * c.abs());

@@ -8,8 +8,8 @@ use fearless_simd::{
 
 use nearmiss_index::PointBlock;
 
-use crate::{Kernel, SurfacePlan};
 use crate::gathered::{Gathered, HALF, half_of};
+use crate::{Kernel, SurfacePlan};
 
 /// Weighted sums over a neighbourhood, relative to the point x for which they were taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

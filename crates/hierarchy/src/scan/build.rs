@@ -338,14 +338,15 @@ impl PointHierarchy {
     #[inline]
     #[must_use]
     pub fn stored_point(&self, i: usize) -> StoredPoint {
-        let (kind, radius) = (self.kind(i), self.arrays.radii[i]);
-        let dense = self.meta.dense as usize;
+        // Each array is read once, as one in a file is checked at every access.
+        let (code, radius) = (self.arrays.codes[i], self.arrays.radii[i]);
+        let (kind, dense) = (code.kind(), self.meta.dense as usize);
         StoredPoint {
             position: PointBlock::position_in(&self.arrays.blocks, i),
             normal: self.arrays.normals[i],
             kind,
             radius,
-            disc: self.arrays.codes[i].disc(radius, self.meta.reach, self.meta.sampling_radius),
+            disc: code.disc(radius, self.meta.reach, self.meta.sampling_radius),
             ball: obstacle_ball(i, dense, kind, radius),
             is_on_sheet: is_on_sheet(i, dense, kind),
             cell: cell_radius(radius, self.meta.reach),

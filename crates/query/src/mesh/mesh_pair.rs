@@ -49,7 +49,7 @@ impl<'a> MeshPairing<'a> {
         let balls =
             PlacedBalls::of([meshes[0].stored_to_world(), meshes[1].stored_to_world()], [*a.ball, *b.ball])?;
         let (stored, relative) = balls.relative();
-        let pose = meshes[0].pose().inverse().after(meshes[1].pose());
+        let pose = meshes[1].pose().relative_to(meshes[0].pose());
         let leaves = [a, b].map(|mesh| mesh.tree.topology().leaves() as u64);
         let meter = Meter::of_leaves(budget, leaves, LEAF_PAIR);
         let gap = balls.gap;

@@ -70,7 +70,7 @@ impl<'a> MeshScanPairing<'a> {
             b,
             stored,
             relative,
-            pose: scan.stored_to_world().inverse().after(mesh.pose()),
+            pose: mesh.pose().relative_to(scan.stored_to_world()),
             gap,
             is_far: gap > FAR_APART * (radii[0] + radii[1]),
             meter: Meter::of_leaves(budget, leaves, LEAF_PAIR),

@@ -120,7 +120,7 @@ impl<'s> Course<'s, '_> {
         let (at, frame) = (self.motion.at(time), *self.elements.placed.stored_to_world());
         match self.shape.moved(&at) {
             Some(moved) => (moved, frame),
-            None => (*self.shape, at.inverse().after(&frame)),
+            None => (*self.shape, frame.relative_to(&at)),
         }
     }
 

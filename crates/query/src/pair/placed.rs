@@ -117,9 +117,7 @@ impl<'a> Placed<'a> {
         let height: f64 = (0..3).map(|k| away[k] * f64::from(nearest.normal[k])).sum();
         let distance_sq: f64 = away.iter().map(|d| d * d).sum();
         let most = f64::from(nearest.cell);
-        nearest.is_on_sheet
-            && height.abs() <= f64::from(SLAB * nearest.radius)
-            && distance_sq <= most * most
+        nearest.is_on_sheet && height.abs() <= f64::from(SLAB * nearest.radius) && distance_sq <= most * most
     }
 
     /// Returns the world position of the `i`-th stored point.

@@ -37,7 +37,7 @@ fn are_comparable([a, b]: [&Pose; 2]) -> bool {
 
 /// Returns b's pose in a's stored frame; `None` if a pose is invalid or out of range.
 pub(crate) fn relative_pose(placed: [&Pose; 2]) -> Option<Pose> {
-    are_comparable(placed).then(|| placed[0].inverse().after(placed[1]))
+    are_comparable(placed).then(|| placed[1].relative_to(placed[0]))
 }
 
 /// Two bounding balls in the world.
@@ -81,7 +81,7 @@ impl<'a> PlacedBalls<'a> {
     /// Returns b's pose in a's stored frame, in double and in single precision.
     pub(crate) fn relative(&self) -> (Pose, Relative) {
         let [a, b] = self.placed;
-        let pose = a.inverse().after(b);
+        let pose = b.relative_to(a);
         let [ra, rb] = self.radii;
         // Coordinates in a's stored frame, of a's own points and of b's.
         let extent = size(self.centre.into()) + (self.distance + ra + 2.0 * rb) / a.scale();
