@@ -20,8 +20,8 @@ use crate::things::AnyScan;
 ///
 /// Answers every question that a `Scan` answers, about the current frame. A certificate is a proof for that
 /// frame. Threads may share it: a question that begins during a change waits until it is complete, and a
-/// change during a question does not wait, but copies the frame for it. So every answer is about one whole
-/// frame, and nothing raises an exception.
+/// question in progress keeps its frame, of which the change makes a copy. So an answer is about one whole
+/// frame, and no question fails because of a change.
 #[pyclass(frozen, extends = AnyScan, module = "nearmiss")]
 #[derive(Debug)]
 pub(crate) struct MovingScan(Arc<Moving>);
@@ -84,9 +84,9 @@ impl MovingScan {
 
     /// Move the points: an array of shape (N, 3), in the order of the first frame, all of them finite.
     ///
-    /// Carries normals and radii along where points move nearly together, which takes a hundredth of
-    /// preparing a `Scan`, and fits them anew elsewhere. Prepares the scan anew if its boxes have become
-    /// loose. Returns how, as `renewal` does. If it raises `ValueError`, the scan is unchanged.
+    /// Carries normals and radii along where points move nearly together, which takes a small part of the
+    /// time of preparing a `Scan`, and fits them anew elsewhere. Prepares the scan anew if its boxes have
+    /// become loose. Returns how, as `renewal` does. If it raises `ValueError`, the scan is unchanged.
     fn move_to(&self, points: &Bound<'_, PyAny>) -> PyResult<&'static str> {
         let (py, points) = (points.py(), Points::new(points)?);
         let points = points.doubles()?;
@@ -106,7 +106,7 @@ impl MovingScan {
     /// Replace the scan by a depth frame: an array of shape (H, W, 3), with a point for each pixel.
     ///
     /// Pixels that are not finite or zero, where nothing was measured, are dropped. Neighbours are sought
-    /// among the pixels around each point, which takes a fifth of the time of `replace`. If it raises
+    /// among the pixels around each point, which takes a small part of the time of `replace`. If it raises
     /// `ValueError`, the scan is unchanged.
     fn replace_organised(&self, points: &Bound<'_, PyAny>) -> PyResult<()> {
         const EXPECTED: &str = "a depth frame of shape (H, W, 3)";

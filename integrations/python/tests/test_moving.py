@@ -8,7 +8,7 @@ import numpy as np
 
 import nearmiss
 from nearmiss import MovingScan, Shape
-from scenes import dragon, plate, poses
+from scenes import depth_frame, dragon, plate, poses
 
 
 def cloth(time, count=40):
@@ -16,16 +16,6 @@ def cloth(time, count=40):
     points = plate(count=count)
     points[:, 2] = 0.1 * np.sin(6.0 * points[:, 0] + time)
     return points
-
-
-def depth_frame(time, height=48, width=64):
-    """A camera looks at a wall, two units away and nearer as time goes by. Returns (height, width, 3)."""
-    v, u = np.meshgrid(np.arange(height) - height / 2, np.arange(width) - width / 2, indexing="ij")
-    depth = 2.0 - 0.1 * time
-    frame = np.stack([u * depth / 60, v * depth / 60, np.full_like(u, depth)], axis=-1)
-    frame[5, 3] = np.nan
-    frame[7, 9] = 0.0
-    return frame
 
 
 def at(x, y=0.0, z=0.0):
