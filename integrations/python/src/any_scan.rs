@@ -120,6 +120,7 @@ impl AnyScan {
     /// the next similar question about two scans. Returns an Answer, in which the source of a mesh is the
     /// index of a triangle. Takes microseconds.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, hint = None, **options))]
+    #[expect(clippy::too_many_arguments, reason = "names in Python")]
     fn collide(
         &self,
         py: Python<'_>,
