@@ -4,10 +4,22 @@ use nearmiss::{Evidence, MeshVerdict, Reason, Verdict};
 use pyo3::prelude::*;
 
 use crate::codes::{
-    NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, number, plain,
-    reason_code, reason_name, shown, undecided, vector, verdict_name,
+    NONE, NOWHERE, answer, bounds_in_words, contact_in_words, evidence_code, evidence_name, index, is_one,
+    is_touching, number, plain, reason_code, reason_name, vector, verdict_name,
 };
-use crate::record::record;
+use crate::record::{Record, record};
+
+/// An answer about two things.
+pub(crate) trait PairRecord: Record + Send {
+    /// The answer to a question with a matrix that is no pose.
+    fn invalid() -> Self;
+
+    /// Returns `true` for [`Self::invalid`].
+    fn is_invalid(&self) -> bool;
+
+    /// The answer with both sides exchanged.
+    fn swapped(self) -> Self;
+}
 
 record! {
     /// An answer of `collide`.
@@ -82,13 +94,22 @@ impl AnswerRecord {
     }
 }
 
-impl AnswerRecord {
-    /// The answer with both sides exchanged.
-    pub(crate) const fn swapped(self) -> Self {
+impl PairRecord for AnswerRecord {
+    fn invalid() -> Self {
+        Self { verdict: i8::MIN, ..Self::new(&nearmiss::Answer::UNASKED) }
+    }
+
+    fn is_invalid(&self) -> bool {
+        self.verdict == i8::MIN
+    }
+
+    fn swapped(self) -> Self {
         let Self { normal_a, normal_b, source_a, source_b, .. } = self;
         Self { normal_a: normal_b, normal_b: normal_a, source_a: source_b, source_b: source_a, ..self }
     }
+}
 
+impl AnswerRecord {
     /// An answer about two meshes, which is exact unless it is undecided. Sources are triangles.
     pub(crate) fn of_meshes(answer: &nearmiss::MeshAnswer) -> Self {
         let mut record = Self { likelihood: answer.likelihood, ..Self::new(&nearmiss::Answer::UNASKED) };
@@ -133,12 +154,10 @@ answer! {
 }
 
 fn answer_in_words(record: &AnswerRecord) -> String {
-    match record.verdict {
-        1 => format!("touching at {:?}{}", record.witness, shown(record.evidence)),
-        0 if record.gap > 0.0 => format!("apart by at least {}, certified", record.gap),
-        0 => format!("apart{}", shown(record.evidence)),
-        _ => undecided(record.reason),
+    if record.gap > 0.0 {
+        return format!("apart by at least {}, certified", record.gap);
     }
+    contact_in_words(record.verdict, record.witness, record.evidence, record.reason)
 }
 
 record! {
@@ -202,16 +221,25 @@ answer! {
 }
 
 fn distance_in_words(record: &DistanceRecord) -> String {
-    format!("between {} and {}{}", record.lower, record.upper, shown(record.evidence))
+    bounds_in_words([record.lower, record.upper], record.evidence)
 }
 
-impl DistanceRecord {
-    /// The distance with both sides exchanged.
-    pub(crate) const fn swapped(self) -> Self {
+impl PairRecord for DistanceRecord {
+    fn invalid() -> Self {
+        Self { lower: NONE, ..bytemuck::Zeroable::zeroed() }
+    }
+
+    fn is_invalid(&self) -> bool {
+        self.lower.is_nan()
+    }
+
+    fn swapped(self) -> Self {
         let Self { point_a, point_b, source_a, source_b, .. } = self;
         Self { point_a: point_b, point_b: point_a, source_a: source_b, source_b: source_a, ..self }
     }
+}
 
+impl DistanceRecord {
     /// The distance of two meshes, which is exact. Sources are triangles.
     pub(crate) fn of_meshes(distance: &nearmiss::MeshDistance) -> Self {
         let [point_a, point_b] = distance.points;

@@ -1,5 +1,7 @@
 //! Arrays of Python as slices of points and matrices.
 
+use std::borrow::Cow;
+
 use nearmiss::{CloudError, PointCloud};
 use numpy::{PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -77,24 +79,34 @@ impl<'py> Points<'py> {
                 })
             }
         };
-        made.map_err(|cause| match cause {
-            CloudError::NotFinite { index } => refused(format!(
-                "expected finite coordinates, got NaN or infinity (point {index}); drop such points with \
-                 drop_invalid=True"
-            )),
-            cause => refused(cause),
-        })
+        made.map_err(|cause| no_cloud(&cause))
     }
 
-    /// Returns the points in double precision.
-    pub(crate) fn to_doubles(&self) -> PyResult<Vec<[f64; 3]>> {
+    /// Returns the points in double precision; those that are given so are not copied.
+    pub(crate) fn doubles(&self) -> PyResult<Cow<'_, [[f64; 3]]>> {
         Ok(match self {
             Self::Single(array) => {
                 let (points, _) = array.as_slice().map_err(refused)?.as_chunks::<3>();
                 points.iter().map(|p| p.map(f64::from)).collect()
             }
-            Self::Double(array) => array.as_slice().map_err(refused)?.as_chunks::<3>().0.to_vec(),
+            Self::Double(array) => Cow::Borrowed(array.as_slice().map_err(refused)?.as_chunks::<3>().0),
         })
+    }
+
+    /// Returns a copy of the points in double precision.
+    pub(crate) fn to_doubles(&self) -> PyResult<Vec<[f64; 3]>> {
+        self.doubles().map(Cow::into_owned)
+    }
+}
+
+/// Returns the error of points that are no cloud.
+pub(crate) fn no_cloud(cause: &CloudError) -> PyErr {
+    match cause {
+        CloudError::NotFinite { index } => refused(format!(
+            "expected finite coordinates, got NaN or infinity (point {index}); drop such points with \
+             drop_invalid=True"
+        )),
+        cause => refused(cause),
     }
 }
 

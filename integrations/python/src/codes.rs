@@ -140,6 +140,20 @@ pub(crate) fn undecided(reason: i8) -> String {
     format!("undecided: {}", reason_name(reason).unwrap_or("unknown"))
 }
 
+/// Returns an answer about contact in words.
+pub(crate) fn contact_in_words(verdict: i8, place: [f64; 3], evidence: i8, reason: i8) -> String {
+    match verdict {
+        1 => format!("touching at {place:?}{}", shown(evidence)),
+        0 => format!("apart{}", shown(evidence)),
+        _ => undecided(reason),
+    }
+}
+
+/// Returns bounds of a distance in words.
+pub(crate) fn bounds_in_words([lower, upper]: [f64; 2], evidence: i8) -> String {
+    format!("between {lower} and {upper}{}", shown(evidence))
+}
+
 /// Reads a truth value.
 pub(crate) const fn is_one(value: u8) -> bool {
     value == 1

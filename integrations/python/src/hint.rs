@@ -1,20 +1,31 @@
 //! Hints: what the last question found out, for the next similar one.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
 
 use pyo3::prelude::*;
 
 use crate::failure::refused;
 
-/// Returns the error of a hint that another thread uses.
-pub(crate) fn busy() -> PyErr {
-    refused("expected a hint for each pair and thread, got one in use by another thread; make one for each")
+/// Locks a hint; fails if another thread uses it.
+fn lock<T>(hint: &Mutex<T>) -> PyResult<MutexGuard<'_, T>> {
+    hint.try_lock().map_err(|_busy| {
+        refused(
+            "expected a hint for each pair and thread, got one in use by another thread; make one for each",
+        )
+    })
 }
 
 /// A hint of a pair of scans.
 #[pyclass(frozen, module = "nearmiss")]
 #[derive(Debug, Default)]
-pub(crate) struct Hint(pub(crate) Mutex<nearmiss::PairHint>);
+pub(crate) struct Hint(Mutex<nearmiss::PairHint>);
+
+impl Hint {
+    /// Locks the hint; fails if another thread uses it.
+    pub(crate) fn lock(&self) -> PyResult<MutexGuard<'_, nearmiss::PairHint>> {
+        lock(&self.0)
+    }
+}
 
 #[pymethods]
 impl Hint {
@@ -32,7 +43,14 @@ impl Hint {
 /// A hint of a scan and a shape.
 #[pyclass(frozen, module = "nearmiss")]
 #[derive(Debug, Default)]
-pub(crate) struct ShapeHint(pub(crate) Mutex<nearmiss::ShapeHint>);
+pub(crate) struct ShapeHint(Mutex<nearmiss::ShapeHint>);
+
+impl ShapeHint {
+    /// Locks the hint; fails if another thread uses it.
+    pub(crate) fn lock(&self) -> PyResult<MutexGuard<'_, nearmiss::ShapeHint>> {
+        lock(&self.0)
+    }
+}
 
 #[pymethods]
 impl ShapeHint {
@@ -48,7 +66,7 @@ impl ShapeHint {
 
     /// Forgets all contacts.
     fn clear(&self) -> PyResult<()> {
-        self.0.try_lock().map_err(|_busy| busy())?.clear();
+        self.lock()?.clear();
         Ok(())
     }
 }

@@ -10,22 +10,28 @@ mod failure;
 
 mod answers;
 mod arrays;
+mod frame;
 mod options;
 mod poses;
 mod shape_answers;
 
+mod each;
 mod prepare;
 mod recipe;
 mod shape;
+mod things;
 
 mod cloud;
-mod each;
 mod hint;
+mod pair;
+mod target;
+
+mod any_scan;
 mod mesh;
+mod moving;
 mod scan;
 mod slices;
 mod sweep;
-mod target;
 mod world;
 
 #[pyo3::pymodule]
@@ -37,7 +43,7 @@ mod _native {
     #[pymodule_export]
     use super::hint::{Hint, ShapeHint};
     #[pymodule_export]
-    use super::mesh::Mesh;
+    use super::moving::MovingScan;
     #[pymodule_export]
     use super::scan::Scan;
     #[pymodule_export]
@@ -50,6 +56,8 @@ mod _native {
     use super::sweep::{SweepAnswer, sweep};
     #[pymodule_export]
     use super::target::Target;
+    #[pymodule_export]
+    use super::things::{AnyScan, Mesh};
     #[pymodule_export]
     use super::world::World;
 }

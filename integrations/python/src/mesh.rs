@@ -1,64 +1,25 @@
-//! `Mesh`: a prepared triangle mesh and the questions about it.
+//! Methods of `Mesh`: a prepared triangle mesh and the questions about it.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use nearmiss::geometry::TriangleMesh;
 use nearmiss::mesh::CleanOptions;
-use nearmiss::{
-    DistanceOptions, DistancePlan, Mesh as Prepared, MeshBuildOptions, MeshPair, MeshScanPair, MeshScanPlan,
-    MeshSolid, Pose, Scratch,
-};
+use nearmiss::{Mesh as Prepared, MeshBuildOptions, MeshSolid, Metric};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
-use crate::answers::{Answer, AnswerRecord, Distance, DistanceRecord, MeshContactRecord};
+use crate::answers::{Answer, Distance, MeshContactRecord};
 use crate::arrays::{Points, corners};
 use crate::cloud::rows;
-use crate::each::{each_answer, each_distance};
 use crate::failure::{refused, unloadable, unreadable, unwritable};
-use crate::options::{OF_BUDGET, OF_DISTANCE, OF_MESHES, OF_SCANS, Options};
+use crate::options::{OF_BUDGET, Options};
+use crate::pair::{Apart, Contact, Question, mesh_pair_of};
 use crate::pool::{ask, in_pool};
-use crate::poses::{Placeable, PosePairs, Poses};
+use crate::poses::both;
 use crate::record::array;
-use crate::scan::{Scan, check_of};
-
-/// A prepared triangle mesh.
-#[pyclass(frozen, module = "nearmiss")]
-#[derive(Debug)]
-pub(crate) struct Mesh {
-    mesh: Prepared,
-    /// The closed parts, once they were asked for.
-    solid: OnceLock<MeshSolid>,
-}
-
-/// The thing that a mesh is compared with.
-#[derive(FromPyObject)]
-enum Other<'py> {
-    Mesh(Bound<'py, Mesh>),
-    Scan(Bound<'py, Scan>),
-}
-
-impl Other<'_> {
-    fn thing(&self) -> &dyn Placeable {
-        match self {
-            Self::Mesh(mesh) => &mesh.get().mesh,
-            Self::Scan(scan) => &scan.get().0,
-        }
-    }
-}
-
-/// A question about contact, with its options.
-enum Contact<'a> {
-    Meshes(&'a Prepared, Options),
-    MeshAndScan(&'a nearmiss::Scan, MeshScanPlan, Options),
-}
-
-/// A question about distance, with its options.
-enum Apart<'a> {
-    Meshes(&'a Prepared, Options),
-    MeshAndScan(&'a nearmiss::Scan, Box<DistancePlan>, Options),
-}
+use crate::scan::check_of;
+use crate::things::{Mesh, Side, Thing};
 
 impl Mesh {
     fn new_of(mesh: Prepared) -> Self {
@@ -71,80 +32,13 @@ impl Mesh {
         built.map(Self::new_of).map_err(refused)
     }
 
-    fn contact<'a>(
+    /// Prepares a question about this mesh and another thing.
+    fn ask<'a, Q: Question<'a>>(
         &'a self,
-        other: &'a Other<'_>,
+        other: &'a Thing<'_>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Contact<'a>> {
-        match other {
-            Other::Mesh(mesh) => {
-                let options = Options::of_metric(options, OF_MESHES, nearmiss::Metric::Euclidean)?;
-                Ok(Contact::Meshes(&mesh.get().mesh, options))
-            }
-            Other::Scan(scan) => {
-                let scan = &scan.get().0;
-                let options = Options::new(options, OF_SCANS, scan)?;
-                let plan = MeshScanPlan::new(&options.collide, scan).map_err(refused)?;
-                Ok(Contact::MeshAndScan(scan, plan, options))
-            }
-        }
-    }
-
-    fn collide_at(&self, asked: &Contact<'_>, [a, b]: [Pose; 2], scratch: &mut Scratch) -> AnswerRecord {
-        match asked {
-            Contact::Meshes(other, options) => {
-                let pair = MeshPair::new(self.mesh.at(&a), other.at(&b)).within(&options.budget());
-                AnswerRecord::of_meshes(&match &options.quality {
-                    Some(quality) => pair.collide_likely(quality, scratch.meshes()),
-                    None => pair.collide(scratch.meshes()),
-                })
-            }
-            Contact::MeshAndScan(scan, plan, options) => {
-                let pair = MeshScanPair::new(scan.at(&b), self.mesh.at(&a)).within(&options.budget());
-                AnswerRecord::new(&pair.collide(plan, scratch)).swapped()
-            }
-        }
-    }
-
-    fn apart<'a>(&'a self, other: &'a Other<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Apart<'a>> {
-        match other {
-            Other::Mesh(mesh) => {
-                let options = Options::of_metric(options, OF_BUDGET, nearmiss::Metric::Euclidean)?;
-                Ok(Apart::Meshes(&mesh.get().mesh, options))
-            }
-            Other::Scan(scan) => {
-                let scan = &scan.get().0;
-                let options = Options::new(options, OF_DISTANCE, scan)?;
-                let asked = DistanceOptions::default()
-                    .with_semantics(options.collide.semantics)
-                    .with_relative(options.relative);
-                let plan = DistancePlan::against_mesh(&asked, scan).map_err(refused)?;
-                Ok(Apart::MeshAndScan(scan, Box::new(plan), options))
-            }
-        }
-    }
-
-    fn distance_at(&self, asked: &Apart<'_>, [a, b]: [Pose; 2], scratch: &mut Scratch) -> DistanceRecord {
-        match asked {
-            Apart::Meshes(other, options) => {
-                let pair = MeshPair::new(self.mesh.at(&a), other.at(&b)).within(&options.budget());
-                DistanceRecord::of_meshes(&pair.distance(scratch.meshes()))
-            }
-            Apart::MeshAndScan(scan, plan, options) => {
-                let pair = MeshScanPair::new(scan.at(&b), self.mesh.at(&a)).within(&options.budget());
-                DistanceRecord::new(&pair.distance(plan, scratch)).swapped()
-            }
-        }
-    }
-
-    /// Returns the one pose of each of both.
-    fn both(
-        &self,
-        other: &dyn Placeable,
-        pose: Option<&Bound<'_, PyAny>>,
-        own: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<[Pose; 2]> {
-        Ok([Poses::new(own)?.one(&self.mesh)?, Poses::new(pose)?.one(other)?])
+    ) -> PyResult<Q> {
+        Q::new([Side::Mesh(&self.mesh), other.side()], options)
     }
 
     fn solid(&self) -> &MeshSolid {
@@ -233,7 +127,7 @@ impl Mesh {
         self.solid().is_closed()
     }
 
-    /// Decide whether this mesh, at `own_pose`, touches `other`, at `pose`: a Mesh or a Scan.
+    /// Decide whether this mesh, at `own_pose`, touches `other`, at `pose`: a Mesh or any scan.
     ///
     /// Poses have shape (4, 4); the default is the identity. Options for two meshes: `p_min` and
     /// `k_min` (stop once `k_min` pairs of nodes, by default 3, are likely to collide with this
@@ -243,32 +137,27 @@ impl Mesh {
     fn collide(
         &self,
         py: Python<'_>,
-        other: Other<'_>,
+        other: Thing<'_>,
         pose: Option<&Bound<'_, PyAny>>,
         own_pose: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Answer> {
-        let asked = self.contact(&other, options)?;
-        let poses = self.both(other.thing(), pose, own_pose)?;
-        Ok(Answer(ask(py, |scratch| self.collide_at(&asked, poses, scratch))))
+        self.ask::<Contact<'_>>(&other, options)?.one(py, [own_pose, pose]).map(Answer)
     }
 
     /// Answer `collide` for many poses on all cores; see `Scan.collide_each`.
     #[pyo3(signature = (other, poses, own_poses = None, **options))]
     fn collide_each<'py>(
         &self,
-        other: Other<'py>,
+        other: Thing<'py>,
         poses: &Bound<'py, PyAny>,
         own_poses: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let asked = self.contact(&other, options)?;
-        let given = [Poses::new(own_poses)?, Poses::new(Some(poses))?];
-        let pairs = PosePairs::new(&given, [&self.mesh, other.thing()])?;
-        each_answer(poses.py(), &pairs, |poses, scratch| self.collide_at(&asked, poses, scratch))
+        self.ask::<Contact<'_>>(&other, options)?.each(poses.py(), [own_poses, Some(poses)])
     }
 
-    /// Measure the distance of this mesh, at `own_pose`, and `other`, at `pose`: a Mesh or a Scan.
+    /// Measure the distance of this mesh, at `own_pose`, and `other`, at `pose`: a Mesh or any scan.
     ///
     /// The distance of two meshes is exact: both bounds are equal, unless `work` or `seconds` end the search.
     /// Options for a scan are those of `Scan.distance`. Returns a Distance, in which the source of a
@@ -277,29 +166,24 @@ impl Mesh {
     fn distance(
         &self,
         py: Python<'_>,
-        other: Other<'_>,
+        other: Thing<'_>,
         pose: Option<&Bound<'_, PyAny>>,
         own_pose: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Distance> {
-        let asked = self.apart(&other, options)?;
-        let poses = self.both(other.thing(), pose, own_pose)?;
-        Ok(Distance(ask(py, |scratch| self.distance_at(&asked, poses, scratch))))
+        self.ask::<Apart<'_>>(&other, options)?.one(py, [own_pose, pose]).map(Distance)
     }
 
     /// Answer `distance` for many poses on all cores; see `Scan.distance_each`.
     #[pyo3(signature = (other, poses, own_poses = None, **options))]
     fn distance_each<'py>(
         &self,
-        other: Other<'py>,
+        other: Thing<'py>,
         poses: &Bound<'py, PyAny>,
         own_poses: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let asked = self.apart(&other, options)?;
-        let given = [Poses::new(own_poses)?, Poses::new(Some(poses))?];
-        let pairs = PosePairs::new(&given, [&self.mesh, other.thing()])?;
-        each_distance(poses.py(), &pairs, |poses, scratch| self.distance_at(&asked, poses, scratch))
+        self.ask::<Apart<'_>>(&other, options)?.each(poses.py(), [own_poses, Some(poses)])
     }
 
     /// Return a contact of each pair of triangles of two meshes that meet, as a structured array of
@@ -314,12 +198,10 @@ impl Mesh {
         pose: Option<&Bound<'py, PyAny>>,
         own_pose: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (py, other) = (other.py(), &other.get().mesh);
-        let [a, b] = self.both(other, pose, own_pose)?;
+        let (py, meshes) = (other.py(), [&self.mesh, &other.get().mesh]);
+        let poses = both(meshes.map(|mesh| mesh as _), [own_pose, pose])?;
         let mut found = Vec::new();
-        ask(py, |scratch| {
-            MeshPair::new(self.mesh.at(&a), other.at(&b)).contacts(&mut found, scratch.meshes())
-        });
+        ask(py, |scratch| mesh_pair_of(&meshes, &poses).contacts(&mut found, scratch.meshes()));
         array(py, found.iter().map(MeshContactRecord::new).collect())
     }
 
@@ -337,10 +219,11 @@ impl Mesh {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<(f64, f64, [f64; 3])> {
         let (py, other) = (other.py(), other.get());
-        let options = Options::of_metric(options, OF_BUDGET, nearmiss::Metric::Euclidean)?;
-        let [a, b] = self.both(&other.mesh, pose, own_pose)?;
+        let options = Options::new(options, OF_BUDGET, Metric::Euclidean)?;
+        let meshes = [&self.mesh, &other.mesh];
+        let poses = both(meshes.map(|mesh| mesh as _), [own_pose, pose])?;
         let found = ask(py, |scratch| {
-            let pair = MeshPair::new(self.mesh.at(&a), other.mesh.at(&b)).within(&options.budget());
+            let pair = mesh_pair_of(&meshes, &poses).within(&options.budget());
             pair.penetration([self.solid(), other.solid()], scratch.meshes())
         });
         Ok((found.lower, found.upper, found.direction))

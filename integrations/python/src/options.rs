@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use nearmiss::{Budget, CollideOptions, Deadline, Detail, Evidence, MeshQuality, Metric, Scan, Semantics};
+use nearmiss::{Budget, CollideOptions, Deadline, Detail, Evidence, MeshQuality, Metric, Semantics};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -39,17 +39,8 @@ pub(crate) const OF_DISTANCE: &[&str] = &["thickened", "surface_only", "relative
 pub(crate) const OF_SHAPES: &[&str] = &["margin", "thickened", "surface_only", "evidence", "detail"];
 
 impl Options {
-    /// Reads options that are among `names`, for a question about `scan`.
-    pub(crate) fn new(given: Option<&Bound<'_, PyDict>>, names: &[&str], scan: &Scan) -> PyResult<Self> {
-        Self::of_metric(given, names, scan.metric())
-    }
-
     /// Reads options that are among `names`, for a question about scans of this metric.
-    pub(crate) fn of_metric(
-        given: Option<&Bound<'_, PyDict>>,
-        names: &[&str],
-        metric: Metric,
-    ) -> PyResult<Self> {
+    pub(crate) fn new(given: Option<&Bound<'_, PyDict>>, names: &[&str], metric: Metric) -> PyResult<Self> {
         let mut options = Self {
             collide: CollideOptions::default(),
             relative: 0.1,

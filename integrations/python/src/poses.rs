@@ -1,6 +1,6 @@
 //! Poses: 4×4 matrices, rotations with `as_matrix()`, and pairs of a rotation and a translation.
 
-use nearmiss::{Aabb, Mesh, Pose, Scan};
+use nearmiss::{Aabb, Mesh, PointHierarchy, Pose};
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -24,9 +24,9 @@ pub(crate) trait Placeable: Sync {
     fn tolerance(&self) -> f64;
 }
 
-impl Placeable for Scan {
+impl Placeable for PointHierarchy {
     fn bounds(&self) -> &Aabb {
-        nearmiss::PointHierarchy::bounds(self)
+        Self::bounds(self)
     }
 
     fn tolerance(&self) -> f64 {
@@ -126,6 +126,14 @@ pub(crate) fn check_each(matrices: &[Matrix], thing: &(impl Placeable + ?Sized))
         }
     }
     Ok(())
+}
+
+/// Returns the one pose of each of two things.
+pub(crate) fn both(
+    [a, b]: [&dyn Placeable; 2],
+    [pose_a, pose_b]: [Option<&Bound<'_, PyAny>>; 2],
+) -> PyResult<[Pose; 2]> {
+    Ok([Poses::new(pose_a)?.one(a)?, Poses::new(pose_b)?.one(b)?])
 }
 
 /// The poses of both things of a batch; one pose serves all.

@@ -9,26 +9,27 @@ use crate::arrays::vector;
 use crate::failure::refused;
 use crate::prepare::watched;
 
+/// The names of options of a scan.
+pub(crate) const OF_SCAN: &[&str] = &["radius_neighbours", "reach", "graph", "close_pairs", "scanner"];
+
+/// The names of options of a moving scan.
+pub(crate) const OF_MOVING: &[&str] = &["radius_neighbours", "reach"];
+
 /// How a scan is prepared, read from keywords.
 pub(crate) struct Recipe {
-    build: BuildOptions,
+    pub(crate) build: BuildOptions,
     graph: Option<(GraphOptions, Option<[f64; 3]>)>,
 }
 
 impl Recipe {
-    /// The names of the options.
-    const NAMES: [&str; 5] = ["radius_neighbours", "reach", "graph", "close_pairs", "scanner"];
-
-    pub(crate) fn new(given: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    /// Reads options that are among `names`.
+    pub(crate) fn new(given: Option<&Bound<'_, PyDict>>, names: &[&str]) -> PyResult<Self> {
         let mut recipe = Self { build: BuildOptions::default(), graph: None };
         let Some(given) = given else { return Ok(recipe) };
-        if let Some(unknown) = given
-            .keys()
-            .iter()
-            .map(|name| name.to_string())
-            .find(|name| !Self::NAMES.contains(&name.as_str()))
+        if let Some(unknown) =
+            given.keys().iter().map(|name| name.to_string()).find(|name| !names.contains(&name.as_str()))
         {
-            let known = Self::NAMES.join(", ");
+            let known = names.join(", ");
             return Err(PyTypeError::new_err(format!("expected options among {known}, got `{unknown}`")));
         }
         let of = |name: &str| given.get_item(name).map(|value| value.filter(|value| !value.is_none()));

@@ -4,8 +4,8 @@ use nearmiss::ShapeVerdict;
 use pyo3::prelude::*;
 
 use crate::codes::{
-    NONE, NOWHERE, answer, evidence_code, evidence_name, index, is_one, is_touching, number, plain,
-    reason_code, reason_name, shown, undecided, vector, verdict_name,
+    NONE, NOWHERE, answer, bounds_in_words, contact_in_words, evidence_code, evidence_name, index, is_one,
+    is_touching, number, plain, reason_code, reason_name, shown, vector, verdict_name,
 };
 use crate::record::record;
 
@@ -40,7 +40,7 @@ impl ShapeRecord {
 }
 
 answer! {
-    /// The answer of `Scan.touch`.
+    /// The answer of `Target.touch`.
     ShapeAnswer of ShapeRecord by touch_in_words {
         @verdict touches: ["separated", "touching"],
         evidence: Option<&'static str> = evidence_name,
@@ -52,11 +52,7 @@ answer! {
 }
 
 fn touch_in_words(record: &ShapeRecord) -> String {
-    match record.verdict {
-        1 => format!("touching at {:?}{}", record.point, shown(record.evidence)),
-        0 => format!("apart{}", shown(record.evidence)),
-        _ => undecided(record.reason),
-    }
+    contact_in_words(record.verdict, record.point, record.evidence, record.reason)
 }
 
 record! {
@@ -106,7 +102,7 @@ impl ShapeDistanceRecord {
 }
 
 answer! {
-    /// The answer of `Scan.shape_distance`.
+    /// The answer of `Target.distance`.
     ShapeDistance of ShapeDistanceRecord by shape_distance_in_words {
         lower: f64 = plain,
         upper: f64 = plain,
@@ -119,7 +115,7 @@ answer! {
 }
 
 fn shape_distance_in_words(record: &ShapeDistanceRecord) -> String {
-    format!("between {} and {}{}", record.lower, record.upper, shown(record.evidence))
+    bounds_in_words([record.lower, record.upper], record.evidence)
 }
 
 record! {
@@ -171,7 +167,7 @@ impl RayRecord {
 }
 
 answer! {
-    /// The answer of `Scan.cast`.
+    /// The answer of `Target.cast`.
     RayAnswer of RayRecord by ray_in_words {
         hit: bool = is_one,
         t: Option<f64> = number,

@@ -1,6 +1,6 @@
 //! Sweeps: whole motions of two scans.
 
-use nearmiss::{Motion, Prepared as _, Scan as Prepared, Sweep, SweepOptions, SweepPlan, SweepVerdict};
+use nearmiss::{Motion, PointHierarchy, Prepared as _, Sweep, SweepOptions, SweepPlan, SweepVerdict};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -12,13 +12,13 @@ use crate::failure::refused;
 use crate::options::Options;
 use crate::pool::ask;
 use crate::poses::{Poses, check_each, pose_of};
-use crate::scan::Scan;
+use crate::things::AnyScan;
 
 /// The names of options of a sweep.
 const OF_SWEEP: &[&str] = &["thickened", "surface_only", "work", "seconds"];
 
 /// Returns the motion of `scan` through poses.
-fn motion(given: Option<&Bound<'_, PyAny>>, scan: &Prepared) -> PyResult<Motion> {
+fn motion(given: Option<&Bound<'_, PyAny>>, scan: &PointHierarchy) -> PyResult<Motion> {
     let poses = Poses::new(given)?;
     let matrices = poses.matrices()?;
     check_each(matrices, scan)?;
@@ -31,19 +31,20 @@ fn motion(given: Option<&Bound<'_, PyAny>>, scan: &Prepared) -> PyResult<Motion>
 /// `a` moves through the poses `path_a`, `b` through `path_b`, of shape (N, 4, 4), by screws; pose k is
 /// reached at time k. A single pose of shape (4, 4) stays. `clearance` is the distance that they keep, a
 /// length. Options: `thickened`, `surface_only`, `work`, `seconds`, as for `Scan.collide`. Returns a
-/// `SweepAnswer`, whose times count poses.
+/// `SweepAnswer`, whose times count poses. Of a moving scan the current frame is swept.
 #[pyfunction]
 #[pyo3(signature = (a, b, path_b, path_a = None, *, clearance = 0.0, **options))]
 pub(crate) fn sweep(
-    a: &Bound<'_, Scan>,
-    b: &Bound<'_, Scan>,
+    a: &Bound<'_, AnyScan>,
+    b: &Bound<'_, AnyScan>,
     path_b: &Bound<'_, PyAny>,
     path_a: Option<&Bound<'_, PyAny>>,
     clearance: f64,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<SweepAnswer> {
-    let (py, a, b) = (a.py(), &a.get().0, &b.get().0);
-    let options = Options::new(options, OF_SWEEP, a)?;
+    let py = a.py();
+    let (a, b) = (&a.get().0.frame(py), &b.get().0.frame(py));
+    let options = Options::new(options, OF_SWEEP, a.metric())?;
     let asked = SweepOptions::default().with_semantics(options.collide.semantics).with_clearance(clearance);
     let plan = SweepPlan::new(&asked, a, b).map_err(refused)?;
     let (way_a, way_b) = (motion(path_a, a)?, motion(Some(path_b), b)?);

@@ -1,12 +1,12 @@
 //! `Target`: a placed scan against shapes and rays.
 
-use nearmiss::{Pose, Ray, Scan as Prepared, Scratch, ShapePlan};
+use nearmiss::{CollideOptions, Pose, Prepared as _, Ray, Scratch, ShapePlan};
 use pyo3::prelude::*;
 
 use crate::arrays::{Points, vector, wrong_shape};
 use crate::failure::refused;
-use crate::hint::{ShapeHint, busy};
-use crate::options::Options;
+use crate::frame::{Frame, Source};
+use crate::hint::ShapeHint;
 use crate::pool::{ask, ask_each};
 use crate::record::{Record, array};
 use crate::shape::Shape;
@@ -14,23 +14,45 @@ use crate::shape_answers::{
     RayAnswer, RayRecord, ShapeAnswer, ShapeContactRecord, ShapeDistance, ShapeDistanceRecord, ShapeRecord,
 };
 
-/// A placed scan, with the meaning of options.
+/// A placed scan, with the meaning of options. If the scan moves, each question is about its frame then.
 #[pyclass(frozen, module = "nearmiss")]
 #[derive(Debug)]
 pub(crate) struct Target {
-    scan: Prepared,
+    source: Source,
+    pose: Pose,
+    options: CollideOptions,
+}
+
+/// The scan of a target as it is now.
+struct Now<'a> {
+    frame: Frame<'a>,
     pose: Pose,
     plan: ShapePlan,
 }
 
+impl Now<'_> {
+    fn target(&self) -> nearmiss::Target<'_> {
+        nearmiss::Target::new(self.frame.at(&self.pose), &self.plan)
+    }
+}
+
 impl Target {
-    pub(crate) fn new(scan: &Prepared, pose: Pose, options: &Options) -> PyResult<Self> {
-        let plan = ShapePlan::new(&options.collide, scan).map_err(refused)?;
-        Ok(Self { scan: scan.clone(), pose, plan })
+    /// Places a scan. Fails if an option is out of range.
+    pub(crate) fn new(
+        py: Python<'_>,
+        source: &Source,
+        pose: Pose,
+        options: CollideOptions,
+    ) -> PyResult<Self> {
+        let target = Self { source: source.clone(), pose, options };
+        target.now(py)?;
+        Ok(target)
     }
 
-    fn at(&self) -> nearmiss::Target<'_> {
-        nearmiss::Target::new(self.scan.at(&self.pose), &self.plan)
+    fn now(&self, py: Python<'_>) -> PyResult<Now<'_>> {
+        let frame = self.source.frame(py);
+        let plan = ShapePlan::new(&self.options, &frame).map_err(refused)?;
+        Ok(Now { frame, pose: self.pose, plan })
     }
 
     /// Asks about each of a sequence of shapes.
@@ -43,7 +65,8 @@ impl Target {
             refused("expected a sequence of Shape, got something else; make them, as by Shape.sphere")
         })?;
         let shapes: Vec<nearmiss::Shape<'_>> = kept.iter().map(|shape| shape.get().convex()).collect();
-        let target = self.at();
+        let now = self.now(given.py())?;
+        let target = now.target();
         let answers = ask_each(given.py(), shapes.len(), |i, scratch| question(&target, &shapes[i], scratch));
         array(given.py(), answers?)
     }
@@ -100,14 +123,15 @@ fn made([origin, way]: [[f64; 3]; 2], [max, radius]: [f64; 2], i: usize) -> PyRe
 
 #[pymethods]
 impl Target {
-    fn __repr__(&self) -> String {
-        format!("<Target: {} points at {:?}>", self.scan.len(), self.pose.translation())
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<Target: {} points at {:?}>", self.source.frame(py).len(), self.pose.translation())
     }
 
     /// Decide whether a shape touches the scan. Returns a `ShapeAnswer`.
-    fn touch(&self, shape: &Bound<'_, Shape>) -> ShapeAnswer {
-        let convex = shape.get().convex();
-        ShapeAnswer(ask(shape.py(), |scratch| ShapeRecord::new(&self.at().touch(&convex, scratch))))
+    fn touch(&self, shape: &Bound<'_, Shape>) -> PyResult<ShapeAnswer> {
+        let (py, convex) = (shape.py(), shape.get().convex());
+        let now = self.now(py)?;
+        Ok(ShapeAnswer(ask(py, |scratch| ShapeRecord::new(&now.target().touch(&convex, scratch)))))
     }
 
     /// Answer `touch` for a sequence of shapes on all cores. Returns a structured array of shape (N,)
@@ -121,11 +145,12 @@ impl Target {
     #[pyo3(signature = (shape, within = f64::INFINITY))]
     fn distance(&self, shape: &Bound<'_, Shape>, within: f64) -> PyResult<ShapeDistance> {
         check_reach(within)?;
-        let convex = shape.get().convex();
+        let (py, convex) = (shape.py(), shape.get().convex());
+        let now = self.now(py)?;
         let record = |scratch: &mut Scratch| {
-            ShapeDistanceRecord::new(self.at().distance(&convex, within, scratch).as_ref())
+            ShapeDistanceRecord::new(now.target().distance(&convex, within, scratch).as_ref())
         };
-        Ok(ShapeDistance(ask(shape.py(), record)))
+        Ok(ShapeDistance(ask(py, record)))
     }
 
     /// Answer `distance` for a sequence of shapes on all cores. Returns a structured array of shape
@@ -149,13 +174,13 @@ impl Target {
         shape: &Bound<'py, Shape>,
         hint: Option<&Bound<'py, ShapeHint>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let shape = shape.get().convex();
-        let mut hint = hint.map(|hint| hint.get().0.try_lock().map_err(|_busy| busy())).transpose()?;
+        let (now, shape) = (self.now(py)?, shape.get().convex());
+        let mut hint = hint.map(|hint| hint.get().lock()).transpose()?;
         let hint = hint.as_deref_mut();
         let mut found = Vec::new();
         ask(py, |scratch| match hint {
-            Some(hint) => self.at().contacts_hinted(&shape, hint, &mut found, scratch),
-            None => self.at().contacts(&shape, &mut found, scratch),
+            Some(hint) => now.target().contacts_hinted(&shape, hint, &mut found, scratch),
+            None => now.target().contacts(&shape, &mut found, scratch),
         });
         array(py, found.iter().map(ShapeContactRecord::new).collect())
     }
@@ -172,8 +197,9 @@ impl Target {
         max: f64,
         radius: f64,
     ) -> PyResult<RayAnswer> {
-        let ray = Self::ray(origin, direction, max, radius)?;
-        Ok(RayAnswer(ask(origin.py(), |scratch| RayRecord::new(&self.at().cast(&ray, scratch)))))
+        let (py, ray) = (origin.py(), Self::ray(origin, direction, max, radius)?);
+        let now = self.now(py)?;
+        Ok(RayAnswer(ask(py, |scratch| RayRecord::new(&now.target().cast(&ray, scratch)))))
     }
 
     /// Answer `cast` for many rays on all cores. `origins` and `directions` have shape (N, 3); one of
@@ -188,7 +214,8 @@ impl Target {
         radius: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (py, rays) = (origins.py(), Self::rays(origins, directions, max, radius)?);
-        let target = self.at();
+        let now = self.now(py)?;
+        let target = now.target();
         array(py, ask_each(py, rays.len(), |i, scratch| RayRecord::new(&target.cast(&rays[i], scratch)))?)
     }
 
@@ -202,13 +229,14 @@ impl Target {
         max: f64,
         radius: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let ray = Self::ray(origin, direction, max, radius)?;
+        let (py, ray) = (origin.py(), Self::ray(origin, direction, max, radius)?);
+        let now = self.now(py)?;
         let mut found = Vec::new();
-        ask(origin.py(), |scratch| self.at().cast_all(&ray, &mut found, scratch));
+        ask(py, |scratch| now.target().cast_all(&ray, &mut found, scratch));
         let record = |hit: &nearmiss::RayHit| {
             RayRecord::new(&nearmiss::RayAnswer { hit: Some(*hit), evidence: hit.evidence })
         };
-        array(origin.py(), found.iter().map(record).collect())
+        array(py, found.iter().map(record).collect())
     }
 }
 

@@ -33,16 +33,7 @@ impl World {
 
     fn pose(&self, id: u64, pose: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
         let poses = Poses::new(pose)?;
-        match &poses {
-            Poses::One(matrix) => self.with(|world| {
-                let placed = world.placed(BodyId(id)).ok_or_else(|| no_body(id))?;
-                let scan = placed.scan();
-                let tolerance = 0.1 * scan.sampling_radius();
-                let pose = Pose::from_matrix(matrix);
-                pose.or_else(|_| Pose::from_row_major(matrix, scan.bounds(), tolerance)).map_err(refused)
-            }),
-            Poses::Many(_) => Err(refused("expected one pose of shape (4, 4), got an array of poses")),
-        }
+        self.with(|world| poses.one(world.placed(BodyId(id)).ok_or_else(|| no_body(id))?.scan()))
     }
 }
 
@@ -71,7 +62,7 @@ impl World {
     #[pyo3(signature = (scan, pose = None))]
     fn insert(&self, scan: &Bound<'_, Scan>, pose: Option<&Bound<'_, PyAny>>) -> PyResult<u64> {
         let scan = &scan.get().0;
-        let pose = Poses::new(pose)?.one(scan)?;
+        let pose = Poses::new(pose)?.one(&**scan)?;
         Ok(self.with(|world| world.insert(scan.clone(), &pose).0))
     }
 
@@ -120,7 +111,7 @@ impl World {
         let Some(first) = world.ids().next().and_then(|id| world.placed(id)) else {
             return Ok((rows(py, Vec::<u64>::new(), &[0, 2])?, array::<AnswerRecord>(py, Vec::new())?));
         };
-        let options = Options::of_metric(options, OF_SCANS, first.scan().metric())?;
+        let options = Options::new(options, OF_SCANS, first.scan().metric())?;
         let plan = CollidePlan::new(&options.collide, first.scan(), first.scan()).map_err(refused)?;
         if let Some(id) = world
             .ids()

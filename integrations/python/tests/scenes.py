@@ -28,6 +28,30 @@ def plate(side=1.0, count=50):
     return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
 
 
+def room():
+    """A room of 6 by 4, with a step of 0.2 across the middle."""
+    x, y = np.meshgrid(np.arange(0, 6.001, 0.04), np.arange(0, 4.001, 0.04), indexing="ij")
+    floor = np.stack([x.ravel(), y.ravel(), np.where(x < 3, 0.0, 0.2).ravel()], axis=1)
+    walls = []
+    for h in np.arange(0, 2.6, 0.04):
+        across, along = np.arange(0, 6.001, 0.04), np.arange(0, 4.001, 0.04)
+        for y in (0.0, 4.0):
+            walls.append(np.stack([across, np.full_like(across, y), np.full_like(across, h)], axis=1))
+        for x in (0.0, 6.0):
+            walls.append(np.stack([np.full_like(along, x), along, np.full_like(along, h)], axis=1))
+    return np.concatenate([floor, *walls])
+
+
+def depth_frame(time, height=48, width=64):
+    """A camera looks at a wall, two units away and nearer as time goes by. Returns (height, width, 3)."""
+    v, u = np.meshgrid(np.arange(height) - height / 2, np.arange(width) - width / 2, indexing="ij")
+    depth = 2.0 - 0.1 * time
+    frame = np.stack([u * depth / 60, v * depth / 60, np.full_like(u, depth)], axis=-1)
+    frame[5, 3] = np.nan
+    frame[7, 9] = 0.0
+    return frame
+
+
 def rotations(rng, count):
     """Random rotations of shape (count, 3, 3)."""
     q, r = np.linalg.qr(rng.normal(size=(count, 3, 3)))

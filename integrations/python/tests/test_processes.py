@@ -52,6 +52,10 @@ class Memory(unittest.TestCase):
                 small = nearmiss.Scan(points)
                 nearmiss.Scan.from_bytes(small.to_bytes())
                 small.collide_each(small, pose[None])
+                moving = nearmiss.MovingScan(points)
+                kept = moving.still()
+                moving.move_to(points + 0.1)
+                kept.collide(moving)
 
         for work, count in ((ask, 5 * ROUNDS), (build, ROUNDS)):
             work(count // 5 + 100)

@@ -8,21 +8,7 @@ import numpy as np
 
 import nearmiss
 from nearmiss import Shape
-from scenes import dragon, plate, poses
-
-
-def room():
-    """A room of 6 by 4, with a step of 0.2 across the middle."""
-    x, y = np.meshgrid(np.arange(0, 6.001, 0.04), np.arange(0, 4.001, 0.04), indexing="ij")
-    floor = np.stack([x.ravel(), y.ravel(), np.where(x < 3, 0.0, 0.2).ravel()], axis=1)
-    walls = []
-    for h in np.arange(0, 2.6, 0.04):
-        across, along = np.arange(0, 6.001, 0.04), np.arange(0, 4.001, 0.04)
-        for y in (0.0, 4.0):
-            walls.append(np.stack([across, np.full_like(across, y), np.full_like(across, h)], axis=1))
-        for x in (0.0, 6.0):
-            walls.append(np.stack([np.full_like(along, x), along, np.full_like(along, h)], axis=1))
-    return np.concatenate([floor, *walls])
+from scenes import dragon, plate, poses, room
 
 
 class Shapes(unittest.TestCase):

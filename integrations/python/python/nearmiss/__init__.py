@@ -20,9 +20,11 @@ from typing import Any
 
 from ._native import (
     Answer,
+    AnyScan,
     Distance,
     Hint,
     Mesh,
+    MovingScan,
     RayAnswer,
     Scan,
     Shape,
@@ -41,9 +43,11 @@ from ._poses import pose
 
 __all__ = [
     "Answer",
+    "AnyScan",
     "Distance",
     "Hint",
     "Mesh",
+    "MovingScan",
     "RayAnswer",
     "Scan",
     "Shape",

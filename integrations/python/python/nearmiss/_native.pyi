@@ -20,9 +20,11 @@ _Pose: TypeAlias = Any
 # An array of shape (N, 4, 4), rotations, or a pair (rotations, translations).
 _Poses: TypeAlias = Any
 
-class _PrepareOptions(TypedDict, total=False):
+class _MovingOptions(TypedDict, total=False):
     radius_neighbours: int
     reach: float | None
+
+class _PrepareOptions(_MovingOptions, total=False):
     graph: bool
     close_pairs: bool
     scanner: ArrayLike | None
@@ -192,7 +194,91 @@ class ShapeHint:
     def __new__(cls) -> ShapeHint: ...
     def clear(self) -> None: ...
 
-class Scan:
+class AnyScan:
+    def __len__(self) -> int: ...
+    @property
+    def bounds(self) -> NDArray[np.float64]: ...
+    @property
+    def sampling_radius(self) -> float: ...
+    @property
+    def reach(self) -> float: ...
+    @property
+    def is_oriented(self) -> bool: ...
+    @property
+    def usable(self) -> float: ...
+    @property
+    def dropped(self) -> tuple[int, int]: ...
+    @property
+    def points(self) -> NDArray[np.float64]: ...
+    @property
+    def normals(self) -> NDArray[np.float32]: ...
+    @property
+    def sources(self) -> NDArray[np.uint32]: ...
+    @overload
+    def collide(
+        self,
+        other: AnyScan,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        hint: Hint | None = None,
+        **options: Unpack[_CollideOptions],
+    ) -> Answer: ...
+    @overload
+    def collide(
+        self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_CollideOptions]
+    ) -> Answer: ...
+    def collide_each(
+        self, other: AnyScan | Mesh, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_CollideOptions]
+    ) -> _Records: ...
+    def distance(
+        self,
+        other: AnyScan | Mesh,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        **options: Unpack[_DistanceOptions],
+    ) -> Distance: ...
+    def distance_each(
+        self, other: AnyScan | Mesh, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_DistanceOptions]
+    ) -> _Records: ...
+    def contacts(
+        self,
+        other: AnyScan | Mesh,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        **options: Unpack[_CollideOptions],
+    ) -> _Records: ...
+    def manifold(
+        self,
+        other: AnyScan,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        hint: Hint | None = None,
+        **options: Unpack[_CollideOptions],
+    ) -> _Records: ...
+    def clashes(
+        self,
+        other: AnyScan,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        clearance: SupportsFloat = 0.0,
+        link: SupportsFloat | None = None,
+        **options: Unpack[_MeaningOptions],
+    ) -> _Records: ...
+    def curves(
+        self,
+        other: AnyScan,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        spacing: SupportsFloat | None = None,
+        tolerance: SupportsFloat | None = None,
+    ) -> list[NDArray[np.float64]]: ...
+    def target(self, pose: _Pose = None, **options: Unpack[_ShapeOptions]) -> Target: ...
+
+class Scan(AnyScan):
     def __new__(
         cls,
         points: ArrayLike,
@@ -217,75 +303,23 @@ class Scan:
     def to_bytes(self) -> bytes: ...
     def save(self, path: _Path) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
-    def __len__(self) -> int: ...
+
+class MovingScan(AnyScan):
+    def __new__(
+        cls, points: ArrayLike, *, drop_invalid: bool = False, **options: Unpack[_MovingOptions]
+    ) -> MovingScan: ...
+    @staticmethod
+    def of(scan: Scan) -> MovingScan: ...
+    def move_to(self, points: ArrayLike) -> Literal["refitted", "renewed", "rebuilt"]: ...
+    def replace(self, points: ArrayLike) -> None: ...
+    def replace_organised(self, points: ArrayLike) -> None: ...
+    def still(self) -> Scan: ...
     @property
-    def bounds(self) -> NDArray[np.float64]: ...
+    def renewal(self) -> Literal["refitted", "renewed", "rebuilt", "replaced"] | None: ...
     @property
-    def sampling_radius(self) -> float: ...
+    def looseness(self) -> float: ...
     @property
-    def reach(self) -> float: ...
-    @property
-    def is_oriented(self) -> bool: ...
-    @property
-    def usable(self) -> float: ...
-    @property
-    def dropped(self) -> tuple[int, int]: ...
-    @property
-    def points(self) -> NDArray[np.float64]: ...
-    @property
-    def normals(self) -> NDArray[np.float32]: ...
-    @property
-    def sources(self) -> NDArray[np.uint32]: ...
-    def collide(
-        self,
-        other: Scan,
-        pose: _Pose = None,
-        own_pose: _Pose = None,
-        *,
-        hint: Hint | None = None,
-        **options: Unpack[_CollideOptions],
-    ) -> Answer: ...
-    def collide_each(
-        self, other: Scan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_CollideOptions]
-    ) -> _Records: ...
-    def distance(
-        self, other: Scan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_DistanceOptions]
-    ) -> Distance: ...
-    def distance_each(
-        self, other: Scan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_DistanceOptions]
-    ) -> _Records: ...
-    def contacts(
-        self, other: Scan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_CollideOptions]
-    ) -> _Records: ...
-    def manifold(
-        self,
-        other: Scan,
-        pose: _Pose = None,
-        own_pose: _Pose = None,
-        *,
-        hint: Hint | None = None,
-        **options: Unpack[_CollideOptions],
-    ) -> _Records: ...
-    def clashes(
-        self,
-        other: Scan,
-        pose: _Pose = None,
-        own_pose: _Pose = None,
-        *,
-        clearance: SupportsFloat = 0.0,
-        link: SupportsFloat | None = None,
-        **options: Unpack[_MeaningOptions],
-    ) -> _Records: ...
-    def curves(
-        self,
-        other: Scan,
-        pose: _Pose = None,
-        own_pose: _Pose = None,
-        *,
-        spacing: SupportsFloat | None = None,
-        tolerance: SupportsFloat | None = None,
-    ) -> list[NDArray[np.float64]]: ...
-    def target(self, pose: _Pose = None, **options: Unpack[_ShapeOptions]) -> Target: ...
+    def misplaced(self) -> float: ...
 
 class Mesh:
     def __new__(cls, vertices: ArrayLike, triangles: ArrayLike, *, weld: SupportsFloat = 0.0) -> Mesh: ...
@@ -309,7 +343,7 @@ class Mesh:
     ) -> Answer: ...
     @overload
     def collide(
-        self, other: Scan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_CollideOptions]
+        self, other: AnyScan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_CollideOptions]
     ) -> Answer: ...
     @overload
     def collide_each(
@@ -317,7 +351,7 @@ class Mesh:
     ) -> _Records: ...
     @overload
     def collide_each(
-        self, other: Scan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_CollideOptions]
+        self, other: AnyScan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_CollideOptions]
     ) -> _Records: ...
     @overload
     def distance(
@@ -325,7 +359,7 @@ class Mesh:
     ) -> Distance: ...
     @overload
     def distance(
-        self, other: Scan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_DistanceOptions]
+        self, other: AnyScan, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_DistanceOptions]
     ) -> Distance: ...
     @overload
     def distance_each(
@@ -333,7 +367,7 @@ class Mesh:
     ) -> _Records: ...
     @overload
     def distance_each(
-        self, other: Scan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_DistanceOptions]
+        self, other: AnyScan, poses: _Poses, own_poses: _Poses = None, **options: Unpack[_DistanceOptions]
     ) -> _Records: ...
     def contacts(self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None) -> _Records: ...
     def penetration(
@@ -377,8 +411,8 @@ class Target:
     ) -> _Records: ...
 
 def sweep(
-    a: Scan,
-    b: Scan,
+    a: AnyScan,
+    b: AnyScan,
     path_b: _Poses,
     path_a: _Poses = None,
     *,

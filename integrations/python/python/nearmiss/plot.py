@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._native import Answer, Distance, Scan
+from ._native import Answer, AnyScan, Distance
 from ._poses import matrices
 
 #: Points drawn of each scan.
@@ -22,7 +22,7 @@ def _pyplot() -> Any:
         raise ImportError("expected matplotlib, got none; `pip install nearmiss[plot]`") from cause
 
 
-def _placed(scan: Scan, pose: Any) -> NDArray[np.float64]:
+def _placed(scan: AnyScan, pose: Any) -> NDArray[np.float64]:
     points = scan.points[:: max(1, len(scan) // MOST)]
     matrix = np.eye(4) if pose is None else matrices(pose)
     placed: NDArray[np.float64] = points @ matrix[:3, :3].T + matrix[:3, 3]
@@ -30,8 +30,8 @@ def _placed(scan: Scan, pose: Any) -> NDArray[np.float64]:
 
 
 def contact(
-    a: Scan,
-    b: Scan,
+    a: AnyScan,
+    b: AnyScan,
     pose: Any = None,
     own_pose: Any = None,
     *,

@@ -1,0 +1,62 @@
+//! The things that questions are about, as classes of Python.
+
+use std::sync::OnceLock;
+
+use nearmiss::{Mesh as PreparedMesh, MeshSolid};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+
+use crate::frame::{Frame, Source};
+
+/// A scan, still or moving: the base of `Scan` and `MovingScan`, with all questions about them.
+#[pyclass(frozen, subclass, module = "nearmiss")]
+#[derive(Debug)]
+pub(crate) struct AnyScan(pub(crate) Source);
+
+/// A prepared triangle mesh.
+#[pyclass(frozen, module = "nearmiss")]
+#[derive(Debug)]
+pub(crate) struct Mesh {
+    pub(crate) mesh: PreparedMesh,
+    /// The closed parts, once they were asked for.
+    pub(crate) solid: OnceLock<MeshSolid>,
+}
+
+/// A thing to compare with.
+pub(crate) enum Thing<'py> {
+    Scan(Bound<'py, AnyScan>),
+    Mesh(Bound<'py, Mesh>),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Thing<'py> {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(scan) = given.cast::<AnyScan>() {
+            return Ok(Self::Scan((*scan).clone()));
+        }
+        match given.cast::<Mesh>() {
+            Ok(mesh) => Ok(Self::Mesh((*mesh).clone())),
+            Err(_) => {
+                let class = given.get_type().name()?;
+                Err(PyTypeError::new_err(format!("expected a Scan, a MovingScan or a Mesh, got {class}")))
+            }
+        }
+    }
+}
+
+impl Thing<'_> {
+    /// Returns the thing as it is now.
+    pub(crate) fn side(&self) -> Side<'_> {
+        match self {
+            Self::Scan(scan) => Side::Scan(scan.get().0.frame(scan.py())),
+            Self::Mesh(mesh) => Side::Mesh(&mesh.get().mesh),
+        }
+    }
+}
+
+/// One of the two sides of a question.
+pub(crate) enum Side<'a> {
+    Scan(Frame<'a>),
+    Mesh(&'a PreparedMesh),
+}
