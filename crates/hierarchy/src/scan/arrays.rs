@@ -19,8 +19,7 @@ use crate::tree::wide::Tree;
 /// The codes and the radii of the points of a full block.
 type FullBlock<'a> = (&'a [PointCode; PointBlock::WIDTH], &'a [f32; PointBlock::WIDTH]);
 
-/// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not
-/// at every access.
+/// The arrays that a query reads, as plain slices.
 #[derive(Debug, Clone, Copy)]
 pub struct ScanArrays<'a> {
     /// Unit normals; see [`crate::PointHierarchy::normals`].

@@ -338,7 +338,6 @@ impl PointHierarchy {
     #[inline]
     #[must_use]
     pub fn stored_point(&self, i: usize) -> StoredPoint {
-        // Each array is read once, as one in a file is checked at every access.
         let (code, radius) = (self.arrays.codes[i], self.arrays.radii[i]);
         let (kind, dense) = (code.kind(), self.meta.dense as usize);
         StoredPoint {

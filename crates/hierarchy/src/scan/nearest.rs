@@ -166,7 +166,6 @@ impl PointHierarchy {
     fn nearest_listed_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Option<u32> {
         let mut nearest = self.nearest_of_leaf(simd, i, x);
         let listed = self.index().list(i / PointBlock::WIDTH, nearest.rounded, nearest.within)?;
-        // Taken once: an array in a file is checked at every access.
         let (blocks, groups): (&[PointBlock], &[PointBlock]) = (&self.arrays.blocks, &self.arrays.groups);
         let last = lanes_of(blocks.len().saturating_sub(1), &(0..self.len()));
         for &group in listed {
