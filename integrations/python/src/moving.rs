@@ -117,8 +117,8 @@ impl MovingScan {
         self.0.change(points.py(), work).map(drop)
     }
 
-    /// How the scan followed the last frame: "refitted", "renewed" (all points fitted anew), "rebuilt" (prepared
-    /// anew, with another order of the points) or "replaced"; None for the first frame.
+    /// The way in which the scan followed the last frame: "refitted", "renewed" (all points fitted anew),
+    /// "rebuilt" (prepared anew, with another order of the points) or "replaced"; None for the first frame.
     #[getter]
     fn renewal(&self, py: Python<'_>) -> Option<&'static str> {
         self.0.latest(py).1
