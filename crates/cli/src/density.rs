@@ -34,8 +34,8 @@ pub struct DensityArgs {
     /// Largest share of wrong verdicts
     #[arg(long, value_name = "RATE", default_value_t = 0.001, value_parser = parse_rate)]
     pub error: f64,
-    /// Number of surfels from which theory derives a number of points, to be reported beside the
-    /// measured number of points
+    /// Number of surfels for a comparison with theory: the number of points that theory derives from it
+    /// is reported beside the measured one
     #[arg(long, value_name = "A", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub surfels: u32,
     /// Poses at each of the 13 distances of `poses --sweep`

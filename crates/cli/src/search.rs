@@ -114,17 +114,17 @@ fn parse_surfels(text: &str) -> Result<SurfelSize, String> {
 /// The names of the traversal orders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum OrderName {
-    /// Depth first, with the deepest overlap of siblings first
+    /// Depth first; of the children of a pair, the one whose boxes overlap most comes first
     Depth,
     /// Pairs whose boxes overlap most come first
     Overlap,
-    /// Pairs come first in which each side of the surface of B has many sample points of A (Klein &
+    /// Pairs with many sample points of A on both sides of the surface of B come first (Klein &
     /// Zachmann 2004, section 5.2)
     Sides,
     /// As `sides`, with sample points weighted by the eigenvalue gap (Klein & Zachmann 2004, section 7)
     SidesByGap,
-    /// Pairs with most grid cells that both surfaces are expected to fill come first (Klein & Zachmann,
-    /// slides, 2003)
+    /// First the pair for which the number of grid cells that both surfaces are expected to fill is
+    /// greatest (Klein & Zachmann, slides, 2003)
     Cells,
 }
 

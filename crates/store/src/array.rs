@@ -81,6 +81,7 @@ impl<T: Pod> Array<T> {
 }
 
 /// Returns a pointer to the elements, which stays valid until the vector is changed or dropped.
+#[expect(clippy::ptr_arg, reason = "the pointer of the vector is meant, not that of a slice of it")]
 fn pointer_to<T>(elements: &Vec<T>) -> NonNull<[T]> {
     // From the vector's own pointer rather than a slice, so that a write through the vector leaves it
     // valid.

@@ -161,6 +161,7 @@ class Frames(unittest.TestCase):
         for words, call in {
             r"options among radius_neighbours, reach, got `graph`": lambda: MovingScan(frame, graph=True),
             r"Scan, a MovingScan or a Mesh, got str": lambda: moving.collide("scan"),
+            r"AnyScan": nearmiss.AnyScan,
         }.items():
             with self.subTest(words), self.assertRaisesRegex(TypeError, words):
                 call()

@@ -46,9 +46,9 @@ pub struct BuildArgs {
     pub max_slope: f64,
     /// Noise: the height that the points of a level floor span within a pixel
     ///
-    /// By default, it is 0 for a mesh and estimated for points. Estimated noise is limited: points that
-    /// span more than 90 % of a slice's height stay an obstacle, unless --max-slope alone makes them
-    /// floor.
+    /// By default, it is 0 for a mesh and estimated for points. Estimated noise is limited: with it,
+    /// points that span more than 90 % of a slice's height remain an obstacle, unless they would be
+    /// floor by --max-slope without any noise.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
     /// Axis that points up: x, y, z, -x, -y or -z
