@@ -295,6 +295,13 @@ fn answers_equal_those_of_the_library() {
     assert!(seen.iter().all(|&it| (100..1000).contains(&it)), "meets, hits, touches, nears: {seen:?}");
 }
 
+#[test]
+fn the_guide_shows_the_program_with_a_window() {
+    let (_, program) = include_str!("../window/src/main.rs").split_once("\n\n").expect("docs, then code");
+    let guide = include_str!("../../../docs/guide/bevy.md");
+    assert!(guide.contains(program), "the code of the guide is that of integrations/bevy/window");
+}
+
 #[cfg(feature = "gizmos")]
 #[test]
 fn scans_and_contacts_are_drawn() {
