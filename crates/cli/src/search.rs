@@ -79,8 +79,8 @@ pub enum MethodName {
 pub enum BracketsName {
     /// The nearest randomly drawn point on the other side
     Drawn,
-    /// The nearest point in the close-pairs map of a, which `preprocess --close-pairs` adds
-    /// (Klein & Zachmann 2005, section 4.3)
+    /// A point on the other side, about two surfel radii away, from the close-pairs map of A, which
+    /// `preprocess --close-pairs` adds (Klein & Zachmann 2005, section 4.3)
     Annulus,
 }
 

@@ -46,9 +46,8 @@ pub struct BuildArgs {
     pub max_slope: f64,
     /// Noise: the height that the points of a level floor span within a pixel
     ///
-    /// By default, it is 0 for a mesh and estimated for points. Estimated noise is limited: with it,
-    /// points that span more than 90 % of a slice's height remain an obstacle, unless they would be
-    /// floor by --max-slope without any noise.
+    /// By default, it is 0 for a mesh and estimated for points. An estimate never raises the share of
+    /// --obstacle above 0.9; only a steep --max-slope can make it greater.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
     /// Axis that points up: x, y, z, -x, -y or -z
