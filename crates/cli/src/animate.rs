@@ -42,7 +42,7 @@ pub struct AnimateArgs {
     /// not tested.
     #[arg(long, value_name = "SCAN", conflicts_with = "against_frames")]
     pub against: Option<PathBuf>,
-    /// Test against these frames; their number must be that of <FRAMES>
+    /// Test against these frames; their number must be that of the FRAMES
     #[arg(long, value_name = "F", num_args = 1..)]
     pub against_frames: Vec<PathBuf>,
     /// Method by which bounding volumes follow the motion
