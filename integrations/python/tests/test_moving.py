@@ -264,7 +264,7 @@ class Questions(unittest.TestCase):
 
 class Threads(unittest.TestCase):
     def test_every_answer_is_about_one_whole_frame(self):
-        """Plates rise by a tenth a frame; no answer may mix two frames, and nobody waits forever."""
+        """Checks that no answer mixes two frames, and that no thread waits forever."""
         first, second = MovingScan(plate(count=30)), MovingScan(plate(count=30))
         probe, wrong, done = nearmiss.Scan(plate(count=30)), [], threading.Event()
         heights = 0.1 * np.arange(8)
