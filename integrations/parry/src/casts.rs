@@ -11,7 +11,7 @@ use nearmiss::{
 };
 
 use crate::convert::{from_pose, from_vector, to_real, to_vector};
-use crate::manifolds::{Touch, deepest};
+use crate::manifolds::Touch;
 use crate::parts::for_parts;
 use crate::question::Question;
 use crate::scan_shape::{ScanShape, with_scratch};
@@ -160,18 +160,15 @@ fn first_impact_of_scans(
     let answer = with_scratch(|scratch| sweep.first_impact(&plan, scratch));
     let SweepVerdict::Impact { t_hit: time, contact, .. } = answer.verdict else { return Ok(None) };
     // At first, the scans may be moving apart, so the side decides.
-    let deepest = if time <= 0.0 { deepest_contact(asked, target_distance)? } else { None };
+    let deepest = if time <= 0.0 { asked.deepest(target_distance)? } else { None };
+    let deepest = deepest.map(|Touch { points: [point, _], normal, gap, .. }| ShapeContact {
+        point,
+        normal,
+        depth: -gap,
+        id: 0,
+    });
     let contact = deepest.unwrap_or_else(|| against(&contact, course.velocity(time, contact.point)));
     Ok(Some(Impact { time, part: 0, contact }))
-}
-
-/// The deepest contact of two scans.
-fn deepest_contact(asked: &Question<'_>, within: Real) -> Result<Option<ShapeContact>, Unsupported> {
-    let mut touches = Vec::new();
-    asked.contacts(within, None, &mut |_, _, touch| touches.push(*touch))?;
-    Ok(deepest(touches.into_iter(), within).map(|Touch { points: [point, _], normal, gap, .. }| {
-        ShapeContact { point, normal, depth: -gap, id: 0 }
-    }))
 }
 
 /// A contact where surfaces meet first. Where the border of one meets the inside of the other, only the

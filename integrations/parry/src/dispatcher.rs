@@ -1,7 +1,5 @@
 //! Questions of parry about a scan and another shape, in either order.
 
-use std::cell::RefCell;
-
 use parry3d::math::{Pose, Real, Vector};
 use parry3d::query::details::{ContactManifoldsWorkspace, NormalConstraints};
 use parry3d::query::{
@@ -12,12 +10,8 @@ use parry3d::shape::Shape;
 
 use crate::casts::{cast, cast_turning};
 use crate::convert::{to_real, to_vector};
-use crate::manifolds::{Kept, Manifolds, Touch, deepest};
+use crate::manifolds::{Kept, Manifolds};
 use crate::question::Question;
-
-thread_local! {
-    static TOUCHES: RefCell<Vec<Touch>> = RefCell::default();
-}
 
 /// Answers the questions of parry about [`ScanShape`](crate::ScanShape) and any other shape, or another
 /// scan, in either order. Everything else is [`Unsupported`], so that a chain asks the next dispatcher.
@@ -53,13 +47,7 @@ impl QueryDispatcher for ScanDispatcher {
         prediction: Real,
     ) -> Result<Option<Contact>, Unsupported> {
         let asked = Question::asked(pos12, g1, g2)?;
-        let mut touches = TOUCHES.take();
-        touches.clear();
-        let searched = asked.contacts(prediction, None, &mut |_, _, touch| touches.push(*touch));
-        let found = deepest(touches.iter().copied(), prediction);
-        TOUCHES.set(touches);
-        searched?;
-        Ok(found.map(|touch| {
+        Ok(asked.deepest(prediction)?.map(|touch| {
             let normal = to_vector(touch.normal);
             let away = asked.pose.rotation.inverse() * -normal;
             let points = asked.ordered(to_vector(touch.points[0]), asked.on_other(touch.points[1]));

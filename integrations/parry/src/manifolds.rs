@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use parry3d::math::{Pose, Real, Vector};
+use parry3d::math::{Pose, Vector};
 use parry3d::query::details::{ContactManifoldsWorkspace, TypedWorkspaceData, WorkspaceData};
 use parry3d::query::{ContactManifold, TrackedContact};
 use parry3d::shape::PackedFeatureId;
@@ -163,9 +163,4 @@ fn set_frames<M, C: Default + Copy>(
         (manifold.subshape1, manifold.subshape2) = (0, part);
         manifold.set_subshape_pos2(part_pose);
     }
-}
-
-/// The deepest contact.
-pub(crate) fn deepest(touches: impl Iterator<Item = Touch>, within: Real) -> Option<Touch> {
-    touches.filter(|it| it.gap <= f64::from(within)).min_by(|a, b| a.gap.total_cmp(&b.gap))
 }

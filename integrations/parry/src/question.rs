@@ -110,6 +110,17 @@ impl<'a> Question<'a> {
         Ok(best)
     }
 
+    /// The deepest contact within `margin`.
+    pub(crate) fn deepest(&self, margin: Real) -> Result<Option<Touch>, Unsupported> {
+        let mut found: Option<Touch> = None;
+        self.contacts(margin, None, &mut |_, _, touch| {
+            if touch.gap <= f64::from(margin) && found.is_none_or(|found| touch.gap < found.gap) {
+                found = Some(*touch);
+            }
+        })?;
+        Ok(found)
+    }
+
     /// Calls `visit` with all contacts within `margin`: the part of the other shape, its pose there,
     /// and the contact.
     pub(crate) fn contacts(
