@@ -7,6 +7,11 @@ use std::ops::Range;
 /// cost of scheduling.
 const AT_ONCE: usize = 1024;
 
+/// The minimum number of pieces of a loop with expensive steps. A thread that has finished can take over
+/// pieces that no other has begun, so threads finish at nearly the same time.
+#[cfg(feature = "rayon")]
+const PIECES: usize = 64;
+
 /// Maps each number below `count`. For cheap `f`: a thread takes many numbers at once.
 pub fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "rayon")]
@@ -44,7 +49,8 @@ pub fn map_with<S, R: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        (0..count).into_par_iter().map_init(scratch, f).collect()
+        let most = count.div_ceil(PIECES);
+        (0..count).into_par_iter().with_max_len(most).map_init(scratch, f).collect()
     }
     #[cfg(not(feature = "rayon"))]
     {
@@ -70,18 +76,25 @@ pub fn ranges_with<S, R: Send>(
     map_with(count.div_ceil(length), scratch, |scratch, k| f(scratch, range(k)))
 }
 
-/// The maximum number of results of [`in_order`] that are held at once.
-const WAVE: usize = 1 << 12;
+/// The number of results of [`in_order`] that are computed while those before are taken.
+const WAVE: usize = 1 << 9;
 
 /// Maps consecutive ranges that partition `0..count`, for expensive `f`. `take` receives the
-/// results in order. At most 4096 results are held at once.
-pub fn in_order<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Send, mut take: impl FnMut(R)) {
+/// results in order, while later ones are computed. At most 1024 results are held at once.
+pub fn in_order<R: Send>(
+    count: usize,
+    f: impl Fn(Range<usize>) -> R + Sync + Send,
+    mut take: impl FnMut(R) + Send,
+) {
     const LENGTH: usize = 16;
     let runs = count.div_ceil(LENGTH);
     let run = |k: usize| f(k * LENGTH..((k + 1) * LENGTH).min(count));
+    let mut last = Vec::new();
     for wave in (0..runs).step_by(WAVE) {
-        map_each(WAVE.min(runs - wave), |k| run(wave + k)).into_iter().for_each(&mut take);
+        let next = || map_each(WAVE.min(runs - wave), |k| run(wave + k));
+        last = both(next, || std::mem::take(&mut last).into_iter().for_each(&mut take)).0;
     }
+    last.into_iter().for_each(take);
 }
 
 /// Writes the items that `f` returns for consecutive ranges of `0..count` into `out`, one after the

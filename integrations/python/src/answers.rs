@@ -11,12 +11,6 @@ use crate::record::{Record, record};
 
 /// An answer about two things.
 pub(crate) trait PairRecord: Record + Send {
-    /// The answer to a question with a matrix that is no pose.
-    fn invalid() -> Self;
-
-    /// Returns `true` for [`Self::invalid`].
-    fn is_invalid(&self) -> bool;
-
     /// The answer with both sides exchanged.
     fn swapped(self) -> Self;
 }
@@ -95,14 +89,6 @@ impl AnswerRecord {
 }
 
 impl PairRecord for AnswerRecord {
-    fn invalid() -> Self {
-        Self { verdict: i8::MIN, ..Self::new(&nearmiss::Answer::UNASKED) }
-    }
-
-    fn is_invalid(&self) -> bool {
-        self.verdict == i8::MIN
-    }
-
     fn swapped(self) -> Self {
         let Self { normal_a, normal_b, source_a, source_b, .. } = self;
         Self { normal_a: normal_b, normal_b: normal_a, source_a: source_b, source_b: source_a, ..self }
@@ -225,14 +211,6 @@ fn distance_in_words(record: &DistanceRecord) -> String {
 }
 
 impl PairRecord for DistanceRecord {
-    fn invalid() -> Self {
-        Self { lower: NONE, ..bytemuck::Zeroable::zeroed() }
-    }
-
-    fn is_invalid(&self) -> bool {
-        self.lower.is_nan()
-    }
-
     fn swapped(self) -> Self {
         let Self { point_a, point_b, source_a, source_b, .. } = self;
         Self { point_a: point_b, point_b: point_a, source_a: source_b, source_b: source_a, ..self }

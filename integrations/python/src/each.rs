@@ -1,5 +1,8 @@
 //! Batches of questions about two things at many poses.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use bytemuck::Zeroable;
 use nearmiss::{Pose, Scratch};
 use pyo3::prelude::*;
 
@@ -18,11 +21,15 @@ pub(crate) fn each<'py, R: PairRecord>(
     let [a, b] = poses;
     let given = [Poses::new(a)?, Poses::new(b)?];
     let pairs = PosePairs::new(&given, things)?;
-    let answers = ask_each(py, pairs.len(), |i, scratch| match pairs.at(i) {
-        Some(poses) => ask(poses, scratch),
-        None => R::invalid(),
+    let is_faulty = AtomicBool::new(false);
+    let answers = ask_each(py, pairs.len(), |i, scratch| {
+        let Some(poses) = pairs.at(i) else {
+            is_faulty.store(true, Ordering::Relaxed);
+            return R::zeroed();
+        };
+        ask(poses, scratch)
     })?;
-    if answers.iter().any(R::is_invalid) {
+    if is_faulty.into_inner() {
         return Err(pairs.fault());
     }
     array(py, answers)

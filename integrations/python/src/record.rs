@@ -1,6 +1,7 @@
 //! Records: plain structs that NumPy reads as structured arrays.
 
 use bytemuck::Pod;
+use bytemuck::allocation::cast_vec;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -55,9 +56,10 @@ fn dtype<'py, R: Record>(py: Python<'py>) -> PyResult<&'py Bound<'py, PyAny>> {
     Ok(made.bind(py))
 }
 
-/// Returns records as a structured array with one dimension.
+/// Returns records as a structured array with one dimension, which takes over their memory.
 pub(crate) fn array<'py, R: Record>(py: Python<'py>, records: Vec<R>) -> PyResult<Bound<'py, PyAny>> {
+    const { assert!(size_of::<R>().is_multiple_of(8) && align_of::<R>() == 8, "expected whole words") };
     let dtype = dtype::<R>(py)?;
-    let bytes = PyArray1::from_slice(py, bytemuck::cast_slice::<R, u8>(&records));
-    bytes.call_method1("view", (dtype,))
+    let words = PyArray1::from_vec(py, cast_vec::<R, u64>(records));
+    words.call_method1("view", (dtype,))
 }

@@ -12,7 +12,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{chunks, collect_into, in_order};
+use nearmiss_lanes::parallel::{change_runs, chunks, collect_into, in_order};
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
 use nearmiss_store::{Room, WorkError, Workspace};
@@ -247,7 +247,7 @@ pub(crate) fn surfels(
 
 impl Surfels {
     /// Stores the results that `give` passes on, one after the other.
-    fn fill(&mut self, give: impl FnOnce(&mut dyn FnMut(Some))) {
+    fn fill(&mut self, give: impl FnOnce(&mut (dyn FnMut(Some) + Send))) {
         let Self { normals, codes, balls, cells, leaves, obstacles } = self;
         let (normals, codes): (&mut [_], &mut [_]) = (normals, codes);
         let (balls, cells): (&mut [_], &mut [_]) = (balls, cells);
@@ -409,6 +409,14 @@ fn kind(at: &Evaluation, look: Look) -> PointKind {
         Status::Border => PointKind::Edge,
         _ => PointKind::Noisy,
     }
+}
+
+/// Flips the normals of each leaf to one side.
+pub(crate) fn align_leaves(normals: &mut [[f32; 3]], leaf_size: usize) {
+    const LEAVES_AT_ONCE: usize = 16;
+    change_runs(normals, LEAVES_AT_ONCE * leaf_size, |_, some| {
+        some.chunks_mut(leaf_size).for_each(align);
+    });
 }
 
 /// Flips a leaf's `normals` to one side: that of their main axis, whose largest component is

@@ -6,10 +6,10 @@ use std::sync::OnceLock;
 use bytemuck::{Pod, Zeroable};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{change_runs, fill, fill_runs};
+use nearmiss_lanes::parallel::{fill, fill_runs};
 use nearmiss_store::{Array, Workspace};
 
-use crate::patch::surfels::{align, codes_of};
+use crate::patch::surfels::{align_leaves, codes_of};
 use crate::point::gather::{Index, NeighbourList};
 use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::groups;
@@ -38,9 +38,7 @@ pub(crate) fn fitted_anew(
     let leaves: Vec<u32> = (0..topology.leaves()).map(id32).collect();
     let codes = codes_of(&index, &positions, &fits, &leaves);
     let mut normals: Vec<[f32; 3]> = fits.iter().map(|fit| fit.normal).collect();
-    change_runs(&mut normals, LEAVES_AT_ONCE * topology.leaf_size(), |_, normals| {
-        normals.chunks_mut(topology.leaf_size()).for_each(align);
-    });
+    align_leaves(&mut normals, topology.leaf_size());
     let arrays = Arrays {
         blocks: blocks.into(),
         groups: groups.into(),
@@ -61,9 +59,6 @@ pub(crate) fn fitted_anew(
     closing.finish(&mut scan);
     Ok(scan)
 }
-
-/// The number of leaves whose normals a thread aligns at once.
-const LEAVES_AT_ONCE: usize = 16;
 
 /// Gives the arrays of a scan the sizes for a topology. Neighbour lists become empty, samples are
 /// spread evenly over the points of each node, and the other arrays are to be filled.
@@ -114,7 +109,5 @@ pub(crate) fn set_normals(scan: &mut PointHierarchy, normal: impl Fn(usize) -> [
     let leaf_size = scan.topology.leaf_size();
     let normals = scan.arrays.normals.to_mut();
     fill(normals, normal);
-    change_runs(normals, LEAVES_AT_ONCE * leaf_size, |_, normals| {
-        normals.chunks_mut(leaf_size).for_each(align);
-    });
+    align_leaves(normals, leaf_size);
 }

@@ -19,7 +19,7 @@ use crate::patch::classes::vote;
 use crate::patch::covering::{Covering, Ground, Solid, coverings};
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::samples;
-use crate::patch::surfels::{Fit, Surfel, align, fitted, surfel_of};
+use crate::patch::surfels::{Fit, Surfel, align_leaves, fitted, surfel_of};
 use crate::point::disc::{DiscRadii, PointCode};
 use crate::point::kind::{PointKind, ball, obstacle_ball};
 use crate::point::spacing::Look;
@@ -125,7 +125,7 @@ impl PointHierarchy {
         };
         let balls: Vec<f32> = surfels.iter().zip(&self.arrays.radii).enumerate().map(ball).collect();
         if !self.meta.is_oriented {
-            normals.chunks_mut(leaf_size).for_each(align);
+            align_leaves(&mut normals, leaf_size);
         }
         let (topology, positions) = (self.topology, self.positions());
         let of_points = Discs { normals: &normals, discs, balls: &balls };

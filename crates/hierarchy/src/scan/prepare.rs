@@ -12,7 +12,7 @@ use crate::patch::covering::{Ground, Solid, coverings};
 use crate::patch::enclosure::growths;
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::{lists as lists_of_samples, samples};
-use crate::patch::surfels::{Known, Surfels, align, surfels};
+use crate::patch::surfels::{Known, Surfels, align_leaves, surfels};
 use crate::point::disc::DiscRadii;
 use crate::point::gather::Index;
 use crate::point::neighbours::{groups, neighbours};
@@ -62,7 +62,7 @@ pub(crate) fn finish(
         surfels(&index, &known, &fits, work)?;
     drop((fits, bare));
     work.progress().reach(share::SURFELS);
-    normals.chunks_mut(options.leaf_size as usize).for_each(align);
+    align_leaves(&mut normals, options.leaf_size as usize);
     let discs = DiscRadii { codes: &codes, radii: &radii, reach, sampling_radius };
     let of_points = Discs { normals: &normals, discs, balls: &balls };
     let mut side_by_side = work.room(blocks.len())?;

@@ -2,7 +2,7 @@
 
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::fill;
+use nearmiss_lanes::parallel::{change_each, fill};
 use nearmiss_store::{Room, Workspace};
 use nearmiss_surface::SurfacePlan;
 
@@ -44,8 +44,8 @@ impl Sampling {
     ) -> Result<Self, BuildError> {
         const WIDTH: usize = PointBlock::WIDTH;
         let mut blocks = work.room(positions.len().div_ceil(WIDTH))?;
-        let of_block = |number: usize| &positions[number * WIDTH..positions.len().min((number + 1) * WIDTH)];
-        fill(&mut blocks, |number| PointBlock::of(of_block(number)));
+        let places = |number: usize| number * WIDTH..positions.len().min((number + 1) * WIDTH);
+        fill(&mut blocks, |number| PointBlock::of(&positions[places(number)]));
         let neighbours = BlockBoxes::new_in(work, &blocks, positions.len())?;
         let tree = neighbours.over(&blocks);
         let mut spacings = spacings(positions, &tree, options.radius_neighbours as usize, work)?;
@@ -59,9 +59,7 @@ impl Sampling {
         let sampling_radius = quantile(&radii, &mut counts);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
         set_reaches(topology, boxes, &radii);
-        for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
-            plan.tune(block, radii);
-        }
+        change_each(&mut blocks, 1 << 8, |number, block| plan.tune(block, &radii[places(number)]));
         Ok(Self { spacings, radii, sampling_radius, reach, plan, blocks })
     }
 }
