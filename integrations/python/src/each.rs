@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use bytemuck::Zeroable;
 use nearmiss::{Pose, Scratch};
 use pyo3::prelude::*;
 

@@ -6,16 +6,20 @@
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, Thread};
+use std::time::Duration;
 
 use bytemuck::Zeroable;
+use bytemuck::allocation::zeroed_vec;
 use nearmiss::{BatchScratch, Scratch, each};
-use pyo3::{PyResult, Python};
+use pyo3::{PyErr, PyResult, Python};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::failure::refused;
 
-/// Batches are cut into parts of this many queries; between them Python handles signals.
-const PART: usize = 1 << 14;
+/// How long a signal may wait during a batch.
+const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
 
 /// The pool of a process, followed by that of a process forked from it.
 struct Threads {
@@ -71,24 +75,47 @@ pub(crate) fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
     Ok(THREADS.pool()?.install(work))
 }
 
-/// Answers `count` questions on all cores, without the interpreter. Ctrl-C ends it between parts.
+/// Sets a flag and wakes a thread when dropped, also by a panic.
+struct Announcement<'a> {
+    is_done: &'a AtomicBool,
+    waiting: Thread,
+}
+
+impl Drop for Announcement<'_> {
+    fn drop(&mut self) {
+        self.is_done.store(true, Ordering::Release);
+        self.waiting.unpark();
+    }
+}
+
+/// Answers `count` questions on all cores, without the interpreter. This thread waits and lets Python
+/// handle signals meanwhile; Ctrl-C ends the batch.
 pub(crate) fn ask_each<T: Zeroable + Copy + Send>(
     py: Python<'_>,
     count: usize,
     ask: impl Fn(usize, &mut Scratch) -> T + Sync,
 ) -> PyResult<Vec<T>> {
-    let mut answers = vec![T::zeroed(); count];
-    let mut scratch = BatchScratch::default();
-    for (part, answers) in answers.chunks_mut(PART).enumerate() {
-        py.check_signals()?;
-        let scratch = &mut scratch;
-        py.detach(|| {
-            in_pool(|| {
-                each(answers, None, scratch, |i, scratch| {
-                    ControlFlow::Continue(ask(part * PART + i, scratch))
-                })
-            })
-        })?;
-    }
+    let mut answers: Vec<T> = zeroed_vec(count);
+    let (is_done, is_ended) = (AtomicBool::new(false), AtomicBool::new(false));
+    let announcement = Announcement { is_done: &is_done, waiting: thread::current() };
+    let ask = |i: usize, scratch: &mut Scratch| {
+        if is_ended.load(Ordering::Relaxed) {
+            ControlFlow::Break(T::zeroed())
+        } else {
+            ControlFlow::Continue(ask(i, scratch))
+        }
+    };
+    let slots = &mut answers[..];
+    THREADS.pool()?.in_place_scope(|scope| {
+        scope.spawn(move |_| {
+            let _announcement = announcement;
+            each(slots, None, &mut BatchScratch::default(), ask);
+        });
+        while !is_done.load(Ordering::Acquire) {
+            py.detach(|| thread::park_timeout(BETWEEN_SIGNALS));
+            py.check_signals().inspect_err(|_| is_ended.store(true, Ordering::Relaxed))?;
+        }
+        Ok::<(), PyErr>(())
+    })?;
     Ok(answers)
 }

@@ -140,6 +140,8 @@ pub(crate) fn both(
 pub(crate) struct PosePairs<'a> {
     matrices: [&'a [Matrix]; 2],
     things: [&'a dyn Placeable; 2],
+    /// The pose of a thing that has one for all.
+    fixed: [Option<Pose>; 2],
 }
 
 impl<'a> PosePairs<'a> {
@@ -151,7 +153,11 @@ impl<'a> PosePairs<'a> {
                 "expected as many poses of both, or one pose for all, got {a} and {b}"
             )));
         }
-        Ok(Self { matrices, things })
+        let fixed = [0, 1].map(|side| match matrices[side] {
+            [matrix] => pose_of(matrix, things[side]).ok(),
+            _ => None,
+        });
+        Ok(Self { matrices, things, fixed })
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -161,9 +167,9 @@ impl<'a> PosePairs<'a> {
 
     /// The `i`-th poses; `None` if a matrix is no pose.
     pub(crate) fn at(&self, i: usize) -> Option<[Pose; 2]> {
-        let pose = |side: usize| {
-            let matrices = self.matrices[side];
-            pose_of(&matrices[if matrices.len() == 1 { 0 } else { i }], self.things[side]).ok()
+        let pose = |side: usize| match self.matrices[side] {
+            [_] => self.fixed[side],
+            matrices => pose_of(&matrices[i], self.things[side]).ok(),
         };
         Some([pose(0)?, pose(1)?])
     }
