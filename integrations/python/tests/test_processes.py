@@ -3,7 +3,9 @@
 import gc
 import multiprocessing
 import os
+import signal
 import threading
+import time
 import tracemalloc
 import unittest
 
@@ -85,6 +87,23 @@ class Concurrency(unittest.TestCase):
         for thread in threads:
             thread.join()
         self.assertEqual(wrong, [])
+
+    def test_an_interrupt_ends_a_batch(self):
+        scan = dragon()
+        # Half a minute of work or more.
+        many = np.repeat(poses(3, 1000, 0.1), 500, axis=0)
+        timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        start = time.monotonic()
+        try:
+            timer.start()
+            with self.assertRaises(KeyboardInterrupt):
+                scan.distance_each(scan, many)
+        finally:
+            timer.join()
+            signal.signal(signal.SIGINT, before)
+        self.assertLess(time.monotonic() - start, 5.0)
+        self.assertEqual(len(scan.distance_each(scan, many[:10])), 10)
 
     @unittest.skipUnless(hasattr(os, "fork"), "needs fork")
     def test_forked_processes_answer_and_prepare(self):
