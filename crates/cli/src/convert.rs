@@ -19,7 +19,7 @@ use crate::digits::{grouped, grouped_count};
 use crate::error::CliError;
 use crate::filters::{ClassList, CropBox, parse_classes, parse_crop};
 use crate::parse::parse_length;
-use crate::preprocess::{FormatChoice, parse_format};
+use crate::preprocess::{FormatChoice, about_formats, parse_format};
 use crate::units::UnitName;
 use crate::{input, output};
 use spill::Spill;
@@ -56,7 +56,7 @@ pub struct ConvertArgs {
     #[arg(long, value_enum, value_name = "UNIT", default_value = "m", requires = "units")]
     pub from_units: UnitName,
     /// Format of the input; auto decides by content, then by name
-    #[arg(long, default_value = "auto", value_parser = parse_format)]
+    #[arg(long, default_value = "auto", value_parser = parse_format, long_help = about_formats())]
     pub format: FormatChoice,
     /// Print one JSON object
     #[arg(long)]

@@ -19,7 +19,7 @@ use outcome::{Seconds, save, tell};
 
 pub(crate) use crate::parse::parse_threads;
 pub use args::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, WeightName};
-pub(crate) use args::{graph_options, options, parse_format};
+pub(crate) use args::{about_formats, graph_options, options, parse_format};
 
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;

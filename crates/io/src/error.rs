@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use nearmiss_geometry::CloudError;
 use thiserror::Error;
 
+use crate::format::Format;
 use crate::text::{bytes, counted, io_words, said};
 
 /// Error of reading a file. The message names the file, the fault, its place and a remedy.
@@ -38,9 +39,8 @@ pub enum ReadError {
     },
     /// Neither the content nor the name identifies the format.
     #[error(
-        "{}: expected ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off or gltf, got an \
-         unknown format; if it is one of these, name it with `preprocess --format`",
-        .path.display()
+        "{}: expected {}, got an unknown format; if it is one of these, name it with `preprocess --format`",
+        .path.display(), Format::list()
     )]
     UnknownFormat {
         /// The file.

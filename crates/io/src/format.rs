@@ -52,6 +52,36 @@ impl Format {
         Self::Gltf,
     ];
 
+    /// Returns the name of the format, followed by the other file extensions that it has.
+    #[must_use]
+    pub const fn names(self) -> &'static [&'static str] {
+        match self {
+            Self::Ply => &["ply"],
+            Self::Pcd => &["pcd"],
+            Self::Xyz => &["xyz", "csv", "txt", "asc", "pts", "xyzn", "xyzrgb", "3d", "neu"],
+            Self::Obj => &["obj"],
+            Self::Las => &["las", "laz"],
+            Self::E57 => &["e57"],
+            Self::Npy => &["npy"],
+            Self::Stl => &["stl"],
+            Self::Off => &["off"],
+            Self::Gltf => &["gltf", "glb"],
+        }
+    }
+
+    /// Returns a list of all names in words: `a, b (also c) or d`.
+    #[must_use]
+    pub fn list() -> String {
+        let named = Self::ALL.map(|format| match format.names() {
+            [name] => (*name).to_owned(),
+            [name, last] => format!("{name} (also {last})"),
+            [name, others @ .., last] => format!("{name} (also {} or {last})", others.join(", ")),
+            [] => String::new(),
+        });
+        let [first @ .., last] = &named;
+        format!("{} or {last}", first.join(", "))
+    }
+
     /// Returns `true` if every file of this format can be read from disk in pieces. Such a format
     /// has no reader for bytes in memory.
     pub(crate) const fn is_streamed(self) -> bool {
@@ -61,9 +91,7 @@ impl Format {
 
 /// Error of parsing a [`Format`] from an unknown name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error(
-    "expected ply, pcd, las (also laz), e57, xyz (also csv), npy, obj, stl, off or gltf (also glb), got `{given}`"
-)]
+#[error("expected {}, got `{given}`", Format::list())]
 pub struct UnknownFormatName {
     /// The given name.
     pub given: String,
@@ -73,56 +101,27 @@ impl FromStr for Format {
     type Err = UnknownFormatName;
 
     fn from_str(name: &str) -> Result<Self, UnknownFormatName> {
-        match name.to_ascii_lowercase().as_str() {
-            "ply" => Ok(Self::Ply),
-            "pcd" => Ok(Self::Pcd),
-            "xyz" | "csv" => Ok(Self::Xyz),
-            "obj" => Ok(Self::Obj),
-            "las" | "laz" => Ok(Self::Las),
-            "e57" => Ok(Self::E57),
-            "npy" => Ok(Self::Npy),
-            "stl" => Ok(Self::Stl),
-            "off" => Ok(Self::Off),
-            "gltf" | "glb" => Ok(Self::Gltf),
-            _ => Err(UnknownFormatName { given: name.into() }),
-        }
+        let is_named = |format: &Self| format.names().iter().any(|known| name.eq_ignore_ascii_case(known));
+        Self::ALL.into_iter().find(is_named).ok_or_else(|| UnknownFormatName { given: name.into() })
     }
 }
 
 impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Ply => "ply",
-            Self::Pcd => "pcd",
-            Self::Xyz => "xyz",
-            Self::Obj => "obj",
-            Self::Las => "las",
-            Self::E57 => "e57",
-            Self::Npy => "npy",
-            Self::Stl => "stl",
-            Self::Off => "off",
-            Self::Gltf => "gltf",
-        })
+        f.write_str(self.names()[0])
     }
 }
-
-/// File extensions of text files that contain only points.
-const TEXT_ENDINGS: [&str; 9] = ["xyz", "csv", "txt", "asc", "pts", "xyzn", "xyzrgb", "3d", "neu"];
 
 /// Recognises the format of a file of this length from its first 64 KiB and its name. Fails for
 /// known formats that cannot be read.
 pub(crate) fn recognise(bytes: &[u8], length: u64, name: &Path) -> Result<Format, ReadError> {
     let unsupported = |format| ReadError::Unsupported { path: name.into(), format };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let ending = ending.to_ascii_lowercase();
     if let Some(foreign) = foreign_magic(bytes) {
         return Err(unsupported(foreign));
     }
     if let Some(format) = magic(bytes, length) {
         return Ok(format);
-    }
-    if TEXT_ENDINGS.contains(&ending.as_str()) {
-        return Ok(Format::Xyz);
     }
     ending.parse().ok().or_else(|| look(bytes)).ok_or_else(|| ReadError::UnknownFormat { path: name.into() })
 }

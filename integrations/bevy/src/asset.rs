@@ -1,21 +1,23 @@
 //! Scans as assets.
 
+use std::iter;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use bevy_asset::io::Reader;
 use bevy_asset::{Asset, AssetLoader, LoadContext};
 use bevy_reflect::TypePath;
 use bevy_tasks::{AsyncComputeTaskPool, TaskPool};
-use nearmiss::io::ReadError;
+use nearmiss::io::{Format, ReadError};
 use nearmiss::{BuildError, BuildOptions, Check, GraphError, GraphOptions, LoadError, Scan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Endings of prepared scans and of all files that nearmiss reads.
-const ENDINGS: [&str; 21] = [
-    "nm", "ply", "pcd", "las", "laz", "e57", "npy", "obj", "stl", "off", "gltf", "glb", "xyz", "csv", "txt",
-    "asc", "pts", "xyzn", "xyzrgb", "3d", "neu",
-];
+static ENDINGS: LazyLock<Vec<&str>> = LazyLock::new(|| {
+    let read = Format::ALL.iter().flat_map(|format| format.names());
+    iter::once("nm").chain(read.copied()).collect()
+});
 
 /// A prepared scan.
 #[derive(Debug, Clone, Asset, TypePath)]

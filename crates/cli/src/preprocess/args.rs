@@ -24,9 +24,7 @@ pub struct PreprocessArgs {
     #[arg(short, long, value_name = "OUT.nm")]
     pub output: PathBuf,
     /// Format of the input; auto decides by content, then by name
-    ///
-    /// Known formats: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf.
-    #[arg(long, default_value = "auto", value_parser = parse_format)]
+    #[arg(long, default_value = "auto", value_parser = parse_format, long_help = about_formats())]
     pub format: FormatChoice,
     /// Prepare the triangles of a mesh, for `mesh-collide` and `--as-mesh` of other commands
     ///
@@ -162,6 +160,11 @@ fn parse_place(text: &str) -> Result<ScannerPosition, String> {
         }
         _ => Err("expected three numbers, x,y,z".into()),
     }
+}
+
+/// Returns the help of `--format`.
+pub(crate) fn about_formats() -> String {
+    format!("Format of the input: {}; auto decides by content, then by name", Format::list())
 }
 
 pub(crate) fn parse_format(name: &str) -> Result<FormatChoice, String> {

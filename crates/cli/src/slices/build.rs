@@ -13,7 +13,7 @@ use crate::digits::short;
 use crate::error::CliError;
 use crate::memory::MemoryArgs;
 use crate::parse::parse_length;
-use crate::preprocess::{FormatChoice, parse_format, parse_threads};
+use crate::preprocess::{FormatChoice, about_formats, parse_format, parse_threads};
 use crate::progress::short_name;
 use crate::threads::pool;
 use crate::{input, output};
@@ -53,10 +53,8 @@ pub struct BuildArgs {
     /// Axis that points up: x, y, z, -x, -y or -z
     #[arg(long, value_name = "AXIS", default_value = "z", allow_hyphen_values = true)]
     pub up: Up,
-    /// Format of the input: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf or auto
-    ///
-    /// With auto, the content and the name of the file decide.
-    #[arg(long, default_value = "auto", value_parser = parse_format)]
+    /// Format of the input; auto decides by content, then by name
+    #[arg(long, default_value = "auto", value_parser = parse_format, long_help = about_formats())]
     pub format: FormatChoice,
     /// The memory limit
     #[command(flatten)]

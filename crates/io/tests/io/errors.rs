@@ -51,12 +51,28 @@ fn files_that_are_none() {
 }
 
 #[test]
+fn formats_are_listed_and_found_by_every_name() {
+    assert_eq!(
+        Format::list(),
+        "ply, pcd, xyz (also csv, txt, asc, pts, xyzn, xyzrgb, 3d or neu), obj, las (also laz), e57, npy, stl, off or \
+         gltf (also glb)"
+    );
+    for format in Format::ALL {
+        for name in format.names() {
+            assert_eq!(name.to_ascii_uppercase().parse(), Ok(format));
+        }
+    }
+}
+
+#[test]
 fn formats_that_are_none_of_ours() {
     says(
         "some words\n",
         "notes.md",
-        "notes.md: expected ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off or gltf, got an \
-         unknown format; if it is one of these, name it with `preprocess --format`",
+        &format!(
+            "notes.md: expected {}, got an unknown format; if it is one of these, name it with `preprocess --format`",
+            Format::list()
+        ),
     );
     says(
         "PK\u{3}\u{4}...",
