@@ -53,7 +53,7 @@ pub struct DeformingScan {
     memory: Memory,
     /// The memory of depth frames.
     pixels: Pixels,
-    /// The cost of the boxes when all points were fitted anew.
+    /// The cost of the boxes when the points were put in order.
     fresh: f64,
 }
 
@@ -106,13 +106,7 @@ impl DeformingScan {
         Self { scan, options, given, twins, memory, pixels: Pixels::default(), fresh }
     }
 
-    /// Takes another scan as the first frame, whose points have just been fitted. Keeps the memory.
-    fn become_scan(&mut self, scan: PointHierarchy, given: usize, twins: Vec<[u32; 2]>) {
-        (self.scan, self.given, self.twins) = (scan, given, twins);
-        self.settle();
-    }
-
-    /// Notes that all points have just been fitted.
+    /// Notes that all points have just been put in order and fitted.
     fn settle(&mut self) {
         self.memory.refresh();
         self.fresh = cost(&self.scan);
@@ -166,8 +160,8 @@ impl DeformingScan {
             );
             scan.turn_normals(self.scan.normals());
         }
-        let twins = std::mem::take(&mut self.twins);
-        self.become_scan(scan, self.given, twins);
+        self.scan = scan;
+        self.memory.refresh();
         Ok(())
     }
 
@@ -197,7 +191,8 @@ impl DeformingScan {
             fitted_anew(&points, Ordered::of(&points, &options, &work)?, &options, closing)
         })
         .or(Err(BuildError::Threads(options.threads)))??;
-        self.become_scan(scan, points.len(), twins);
+        (self.scan, self.given, self.twins) = (scan, points.len(), twins);
+        self.settle();
         Ok(())
     }
 
@@ -231,9 +226,10 @@ impl DeformingScan {
         Ok(())
     }
 
-    /// Returns the cost of the boxes relative to that when all points were last fitted anew: the sum
-    /// of the areas of all boxes, in squared local radii (Goldsmith & Salmon 1987). The greater, the
-    /// looser the boxes. O(n), a small part of a refit.
+    /// Returns the cost of the boxes relative to that when the points were last put in order, by
+    /// [`Self::new`], [`Self::rebuild`] or a replacement: the sum of the areas of all boxes, in squared
+    /// local radii (Goldsmith & Salmon 1987). The greater, the looser the boxes. O(n), a small part of a
+    /// refit.
     #[must_use]
     pub fn looseness(&self) -> f64 {
         let looseness = cost(&self.scan) / self.fresh;

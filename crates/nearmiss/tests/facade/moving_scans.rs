@@ -158,6 +158,19 @@ fn replaced_depth_frames_answer_as_prepared_ones_outside_the_band() {
 }
 
 #[test]
+fn a_scan_whose_points_changed_places_is_prepared_anew() {
+    let points = ball();
+    let mut moving = MovingScan::new(&points, &BuildOptions::default()).unwrap();
+    assert_ne!(points.len() % 271, 0, "271 is prime, so every point gets another place");
+    let shuffled: Vec<_> = (0..points.len()).map(|i| points[i * 271 % points.len()]).collect();
+    moving.renew(&shuffled).unwrap();
+    let loose = moving.looseness();
+    assert!(loose > 2.0, "a renewal keeps the order, so boxes are loose: {loose}");
+    assert_eq!(moving.move_to(&shuffled).unwrap(), Renewal::Rebuilt);
+    assert!((moving.looseness() - 1.0).abs() < 1e-6, "{}", moving.looseness());
+}
+
+#[test]
 fn a_hint_of_an_earlier_frame_certifies_nothing() {
     let points = ball();
     let still = MovingScan::new(&points, &BuildOptions::default()).unwrap();
