@@ -5,6 +5,7 @@ use std::path::Path;
 
 use nearmiss_benches::Failure;
 use nearmiss_benches::guard::counts::{self, Scenario};
+use rayon::prelude::*;
 
 /// Greatest ratio of a count to that on record which passes.
 const MOST: f64 = 1.03;
@@ -37,18 +38,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
         count.and_then(|count| count.parse::<u64>().ok())
     };
     let program = std::env::current_exe()?;
+    let is_wanted = |name: &str| only.is_empty() || only.iter().any(|wanted| wanted == name);
+    // Counts do not depend on what else runs.
+    let count = |(scenario, name): (Scenario, &str)| {
+        let counted = || counts::count(scenario, &program, &["counts", "--run", name]);
+        is_wanted(name).then(counted).transpose().map_err(|cause| cause.to_string())
+    };
+    let counts: Vec<Option<u64>> = Scenario::ALL.into_par_iter().map(count).collect::<Result<_, _>>()?;
     let (mut is_clean, mut new) = (true, String::from("scenario,instructions\n"));
     println!("| scenario | instructions | on record | ratio |\n| --- | --: | --: | --: |");
-    for (scenario, name) in Scenario::ALL {
-        if !only.is_empty() && !only.iter().any(|wanted| wanted == name) {
-            if let Some(count) = on_record(name) {
-                new += &format!("{name},{count}\n");
-            }
-            continue;
+    for ((_, name), count) in Scenario::ALL.into_iter().zip(counts) {
+        let before = on_record(name);
+        if let Some(count) = count.or(before) {
+            new += &format!("{name},{count}\n");
         }
-        let count = counts::count(scenario, &program, &["counts", "--run", name])?;
-        new += &format!("{name},{count}\n");
-        match on_record(name) {
+        let Some(count) = count else { continue };
+        match before {
             Some(before) => {
                 #[expect(clippy::cast_precision_loss, reason = "a ratio for people")]
                 let ratio = count as f64 / before as f64;
