@@ -24,6 +24,23 @@ const fn most<T>() -> usize {
     isize::MAX.unsigned_abs() / if size_of::<T>() == 0 { 1 } else { size_of::<T>() }
 }
 
+/// Refuses a pointer to `count` values that is not aligned, or too many values.
+fn check<T>(first: *const T, count: usize, name: &str) -> Result<(), Failure> {
+    if count > most::<T>() {
+        return Err(Failure::argument(format_args!(
+            "expected at most {} values for {name}, got {count}",
+            most::<T>()
+        )));
+    }
+    if !first.is_aligned() {
+        let align = align_of::<T>();
+        return Err(Failure::argument(format_args!(
+            "expected a pointer aligned to {align} bytes for {name}, got another one"
+        )));
+    }
+    Ok(())
+}
+
 /// Returns `count` values as a slice. The pointer may be null if there are none.
 ///
 /// # Safety
@@ -35,11 +52,7 @@ pub(crate) unsafe fn slice<'a, T>(first: *const T, count: usize, name: &str) -> 
     if first.is_null() {
         return Err(Failure::null(name));
     }
-    if !first.is_aligned() || count > most::<T>() {
-        return Err(Failure::argument(format_args!(
-            "expected {name} of {count} aligned values, got another pointer"
-        )));
-    }
+    check(first, count, name)?;
     // SAFETY: it is not null, aligned and not too long; the caller promises the values.
     Ok(unsafe { std::slice::from_raw_parts(first, count) })
 }
@@ -60,13 +73,9 @@ pub(crate) unsafe fn fill<T>(
         return Ok(());
     }
     if first.is_null() {
-        return Err(Failure::null("out"));
+        return Err(Failure::null("the places of a list"));
     }
-    if !first.is_aligned() || capacity > most::<T>() {
-        return Err(Failure::argument(format_args!(
-            "expected {capacity} aligned places, got another pointer"
-        )));
-    }
+    check(first, capacity, "the places of a list")?;
     for (i, value) in values.take(capacity).enumerate() {
         // SAFETY: `i` is below `capacity`, so the place is one of those that the caller promises.
         unsafe { first.add(i).write(value) };
@@ -94,5 +103,5 @@ pub(crate) unsafe fn text<'a>(text: *const c_char, name: &str) -> Result<&'a str
 /// As for [`text`].
 pub(crate) unsafe fn path(given: *const c_char) -> Result<PathBuf, Failure> {
     // SAFETY: as the caller promises.
-    unsafe { text(given, "path") }.map(PathBuf::from)
+    unsafe { text(given, "file") }.map(PathBuf::from)
 }

@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 
 use nearmiss::io::ReadError;
 use nearmiss::store::{ContainerFault, OpenError, WriteError};
-use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud};
+use nearmiss::{BuildOptions, Check, CloudError, GraphOptions, LoadError, PointCloud};
 
 use crate::handle::{Handle, free, get, make, opaque};
 use crate::pointer::{fill, path, slice, write};
@@ -95,7 +95,14 @@ fn of_points<T: nearmiss::geometry::Coordinate>(
     } else {
         PointCloud::cleaned(points)
     };
-    prepare(&cloud.map_err(Failure::argument)?, options)
+    let cloud = cloud.map_err(|cause| match cause {
+        CloudError::NotFinite { index } => Failure::argument(format_args!(
+            "expected finite coordinates, got NaN or infinity (point {index}); drop such points with the option \
+             `drop_invalid`"
+        )),
+        cause => Failure::argument(cause),
+    })?;
+    prepare(&cloud, options)
 }
 
 /// Prepares `count` points, three numbers each, and writes the handle to `out`. `options` may be null.

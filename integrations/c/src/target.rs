@@ -266,9 +266,9 @@ pub unsafe extern "C" fn nearmiss_shape_distance(
     })
 }
 
-/// Writes the contacts of a shape with a scan to `out`, as many as its capacity holds, the deepest
-/// first, and their number, at most eight, to `count`. `hint` may be null. Thread safety: one call at a
-/// time for each scratch and each hint.
+/// Writes the contacts of a shape with a scan to `out`, as many as its capacity holds, and their number,
+/// at most eight, to `count`: the deepest first, then always the one furthest from those before. `hint`
+/// may be null. Thread safety: one call at a time for each scratch and each hint.
 ///
 /// # Safety
 /// `out` are `capacity` places; other pointers are null or valid.

@@ -1,6 +1,7 @@
 //! A character walks through a scanned building in a world of rapier, along a route on its slice map:
-//! `cargo run --release -p nearmiss-parry --example walk -- SCAN X,Y,Z X,Y,Z`. The scan is in metres, z up;
-//! any file that nearmiss reads. Both places are near a floor.
+//! `cargo run --release -p nearmiss-parry --example walk -- SCAN X,Y,Z X,Y,Z`. The scan is in metres, z up:
+//! a prepared scan (`.nm`), or a point cloud in any format that nearmiss reads. Both places are near a
+//! floor.
 //!
 //! Prints where the feet are each second, and the time of a step. `--falls` lets the route go off edges.
 
@@ -10,16 +11,17 @@
     reason = "a program may print and read the clock"
 )]
 
+mod common;
+
+use std::process::ExitCode;
 use std::time::Instant;
 
-use nearmiss::io::read;
+use common::Failure;
 use nearmiss::slices::{Avatar, AvatarOptions, Pixel, Route, SliceBuilder, SliceOptions, SlicePlan};
-use nearmiss::{Aabb, BuildOptions, PointCloud, Scan};
+use nearmiss::{Aabb, PointCloud};
 use nearmiss_parry::{Character, CharacterOptions, Obstacle, ScanDispatcher, ScanShape};
 use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher as _};
 use rapier3d::prelude::*;
-
-type Failure = Box<dyn std::error::Error>;
 
 /// The speed of a walk, in metres a second.
 const SPEED: f32 = 1.4;
@@ -33,12 +35,17 @@ const PATIENCE: u32 = 120;
 /// A point of the route is reached within this distance across.
 const NEAR: f32 = 0.1;
 
-fn main() -> Result<(), Failure> {
+fn main() -> ExitCode {
+    common::finish(run())
+}
+
+fn run() -> Result<(), Failure> {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let [path, from, to, ..] = words.as_slice() else { return Err("give SCAN FROM TO".into()) };
+    let [path, from, to, ..] = words.as_slice() else {
+        return Err("expected a scan and two places, SCAN X,Y,Z X,Y,Z".into());
+    };
     let [from, to] = [place(from)?, place(to)?];
-    let cloud = read(path, None)?.cloud;
-    let scan = Scan::build(&cloud, &BuildOptions::default())?;
+    let (scan, cloud) = common::open(path)?;
     println!("{} points, sampling radius {:.3}", scan.len(), scan.sampling_radius());
     let route = route(&cloud, scan.bounds(), [from, to], words.iter().any(|word| word == "--falls"))?;
     println!("a route of {} points", route.points.len());
@@ -113,8 +120,9 @@ fn route(cloud: &PointCloud, bounds: &Aabb, ends: [[f64; 3]; 2], falls: bool) ->
 }
 
 fn place(word: &str) -> Result<[f64; 3], Failure> {
-    let numbers: Vec<f64> = word.split(',').map(str::parse).collect::<Result<_, _>>()?;
-    Ok(numbers.try_into().map_err(|got| format!("expected a place X,Y,Z, got {got:?}"))?)
+    let numbers: Option<Vec<f64>> = word.split(',').map(|number| number.trim().parse().ok()).collect();
+    let place = numbers.and_then(|numbers| numbers.try_into().ok());
+    place.ok_or_else(|| format!("expected a place X,Y,Z, got {word:?}").into())
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rapier computes in single precision")]

@@ -19,7 +19,7 @@ pub fn from_pose(pose: &ParryPose) -> Pose {
 #[must_use]
 pub fn to_pose(pose: &Pose) -> ParryPose {
     let columns = [0, 1, 2].map(|k| pose.rotate([0, 1, 2].map(|j| f64::from(u8::from(j == k)))));
-    let [x, y, z] = columns.map(|column| to_vector(column.map(|c| c / pose.scale())));
+    let [x, y, z] = columns.map(to_vector);
     let rotation = Rot3::from_mat3(&parry3d::math::Mat3::from_cols(x, y, z));
     ParryPose::from_parts(to_vector(pose.translation()), rotation)
 }

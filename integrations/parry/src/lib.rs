@@ -12,6 +12,7 @@ mod character_options;
 mod convert;
 mod dispatcher;
 mod manifolds;
+mod mass;
 mod obstacles;
 mod parts;
 mod question;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use parry3d::bounding_volume::{Aabb, BoundingSphere};
 use parry3d::mass_properties::MassProperties;
-use parry3d::math::{Mat3, Real, Vector};
+use parry3d::math::{Real, Vector};
 use parry3d::query::{PointProjection, PointQuery, Ray as ParryRay, RayCast, RayIntersection};
 use parry3d::shape::{FeatureId, Shape as ParryShape, ShapeType, SharedShape, TypedShape};
 
@@ -14,6 +14,7 @@ use nearmiss::{
 };
 
 use crate::convert::{from_vector, to_real, to_vector};
+use crate::mass::Mass;
 
 thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
@@ -45,8 +46,8 @@ struct Inner {
     /// Maps the scan to the frame of the shape.
     pose: Pose,
     bounds: Aabb,
-    /// For a density of one.
-    mass: MassProperties,
+    /// In the frame of the shape.
+    mass: Mass,
 }
 
 impl ScanShape {
@@ -67,16 +68,20 @@ impl ScanShape {
         let plan = ShapePlan::new(options, &scan)?;
         CollidePlan::new(options, &scan, &scan)?;
         let bounds = bounds(&scan, &Pose::IDENTITY);
-        let mass = MassProperties::default();
+        let mass = Mass::default();
         Ok(Self(Arc::new(Inner { scan, options: *options, plan, pose: Pose::IDENTITY, bounds, mass })))
     }
 
     /// The same shape with its scan placed in the frame of the shape, for example to move the
-    /// coordinates of a survey near zero, or to scale it.
+    /// coordinates of a survey near zero, or to scale it. The pose replaces the one before.
+    ///
+    /// Mass properties move and scale with the scan: `shape.solid()?.placed(&pose)` has those of
+    /// `shape.placed(&pose).solid()?`.
     #[must_use]
     pub fn placed(self, pose: &Pose) -> Self {
         let bounds = bounds(&self.0.scan, pose);
-        Self(Arc::new(Inner { pose: *pose, bounds, ..Arc::unwrap_or_clone(self.0) }))
+        let mass = self.0.mass.moved(&pose.after(&self.0.pose.inverse()));
+        Self(Arc::new(Inner { pose: *pose, bounds, mass, ..Arc::unwrap_or_clone(self.0) }))
     }
 
     /// The same shape with the mass properties of the solid that the scan encloses
@@ -89,18 +94,18 @@ impl ScanShape {
         /// The greatest difference between volumes by lines along one axis.
         const SPREAD: f64 = 0.05;
         let moments = with_scratch(|scratch| self.target().moments(LINES, scratch))?;
-        let [x, y, z] = moments.inertia.map(to_vector);
-        let centre = to_vector(moments.centre);
-        let inertia = Mat3::from_cols(x, y, z);
-        let mass = MassProperties::with_inertia_matrix(centre, to_real(moments.volume), inertia);
-        (moments.spread <= SPREAD).then(|| self.with_mass(mass))
+        (moments.spread <= SPREAD).then(|| self.weighing(Mass::of(&moments)))
     }
 
     /// The same shape with the mass properties of a solid of density one, in the frame of the shape.
     /// A scan is a surface; without this call or [`Self::solid`] it has no mass.
     #[must_use]
     pub fn with_mass(self, of_density_one: MassProperties) -> Self {
-        Self(Arc::new(Inner { mass: of_density_one, ..Arc::unwrap_or_clone(self.0) }))
+        self.weighing(of_density_one.into())
+    }
+
+    fn weighing(self, mass: Mass) -> Self {
+        Self(Arc::new(Inner { mass, ..Arc::unwrap_or_clone(self.0) }))
     }
 
     /// The scan.
@@ -231,9 +236,7 @@ impl ParryShape for ScanShape {
     }
 
     fn mass_properties(&self, density: Real) -> MassProperties {
-        let mut scaled = self.0.mass;
-        scaled.set_mass(scaled.mass() * density, true);
-        scaled
+        self.0.mass.with_density(density)
     }
 
     fn shape_type(&self) -> ShapeType {

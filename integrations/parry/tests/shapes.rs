@@ -2,7 +2,7 @@
 
 use nearmiss::geometry::PointCloud;
 use nearmiss::{BuildOptions, CollideOptions, Scan, Scratch, Shape, ShapePlan, Target};
-use nearmiss_parry::{ScanDispatcher, ScanShape, from_pose};
+use nearmiss_parry::{ScanDispatcher, ScanShape, from_pose, to_pose};
 use parry3d::math::{Pose, Vector};
 use parry3d::query::{
     ClosestPoints, ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, PointQuery,
@@ -290,4 +290,71 @@ fn a_closed_scan_weighs_as_its_mesh() {
         assert!((a / b - 1.0).abs() < 0.03, "{ours:?} and {exact:?}");
     }
     assert!(floor().solid().is_none(), "a floor encloses nothing");
+}
+
+/// An ellipsoid with semi-axes of 1, 0.8 and 0.5, about a centre.
+fn ellipsoid(centre: [f64; 3]) -> ScanShape {
+    let points: Vec<[f64; 3]> = (0..6000_u32)
+        .map(|k| {
+            let (height, turn) = (f64::from(2 * k + 1) / 6000.0 - 1.0, 2.399_963 * f64::from(k));
+            let across = (1.0 - height * height).sqrt();
+            let place = [across * turn.cos(), 0.8 * across * turn.sin(), 0.5 * height];
+            [0, 1, 2].map(|axis| centre[axis] + place[axis])
+        })
+        .collect();
+    let cloud = PointCloud::from_positions(&points).expect("points");
+    ScanShape::new(Scan::build(&cloud, &BuildOptions::default()).expect("a scan")).expect("for shapes")
+}
+
+/// Compares masses, centres of mass and inertia, with a tolerance as a share of each.
+fn assert_same_mass(a: &ScanShape, b: &ScanShape, tolerance: f32) {
+    let [a, b] = [a, b].map(|it| it.mass_properties(3.0));
+    assert!((a.mass() / b.mass() - 1.0).abs() < tolerance, "{} and {}", a.mass(), b.mass());
+    assert!((a.local_com - b.local_com).length() < tolerance, "{} and {}", a.local_com, b.local_com);
+    let most = b.principal_inertia().max_element();
+    let apart = a.reconstruct_inertia_matrix() - b.reconstruct_inertia_matrix();
+    let off = apart.to_cols_array().into_iter().fold(0.0_f32, |off, it| off.max(it.abs()));
+    assert!(off < tolerance * most, "inertia differs by {off} of {most}");
+}
+
+#[test]
+fn mass_moves_and_scales_with_the_scan() {
+    let pose = nearmiss::Pose::from_axis_angle([1.0, 2.0, 3.0], 0.7).with_scale(0.5);
+    let pose = pose.with_translation([3.0, -1.0, 2.0]);
+    let raw = ellipsoid([0.3, 0.0, 0.0]);
+    let solid = raw.clone().solid().expect("it is closed");
+    let placed = solid.clone().placed(&pose);
+    assert_same_mass(&placed, &raw.clone().placed(&pose).solid().expect("it is closed"), 0.01);
+    let exact = 4.0 / 3.0 * std::f32::consts::PI * 0.8 * 0.5 * 0.125;
+    let mass = placed.mass_properties(1.0).mass();
+    assert!((mass / exact - 1.0).abs() < 0.02, "{mass}, exact {exact}");
+
+    // The last pose counts, and the mass of a pose that is undone is the mass before.
+    let other = nearmiss::Pose::from_axis_angle([0.0, 1.0, 0.0], -2.0).with_scale(7.0);
+    assert_same_mass(&placed.clone().placed(&other).placed(&pose), &placed, 1e-4);
+    assert_same_mass(&placed.clone().placed(&nearmiss::Pose::IDENTITY), &solid, 1e-4);
+    let doubled = placed.scale_dyn(Vector::splat(2.0), 0).expect("a uniform scale");
+    assert!((doubled.mass_properties(1.0).mass() / mass - 8.0).abs() < 1e-3, "eight times the mass");
+    assert!(raw.placed(&pose).mass_properties(1.0).mass() == 0.0, "a surface has no mass");
+}
+
+#[test]
+fn the_centre_of_mass_of_a_survey_is_exact() {
+    let away = [5_300_000.25, -420_000.5, 310.125];
+    let near = nearmiss::Pose::from_translation(away.map(|c| -c));
+    let solid = ellipsoid(away).solid().expect("it is closed").placed(&near);
+    let centre = solid.mass_properties(1.0).local_com;
+    assert!(centre.length() < 2e-3, "{centre}");
+}
+
+#[test]
+fn poses_convert_in_both_directions() {
+    let pose = Pose::new(Vector::new(1.0, 2.0, 3.0), Vector::new(0.4, -1.2, 0.3));
+    for scale in [0.001, 1.0, 40.0] {
+        let back = to_pose(&from_pose(&pose).with_scale(scale));
+        let apart = back.rotation.angle_between(pose.rotation);
+        let unit = back.rotation.length();
+        assert!(back.translation == pose.translation && apart < 1e-3, "{back:?}, scale {scale}");
+        assert!((unit - 1.0).abs() < 1e-5, "a rotation of length {unit}, scale {scale}");
+    }
 }

@@ -122,19 +122,34 @@ answer! {
     /// The answer of `collide`.
     Answer of AnswerRecord by answer_in_words {
         @verdict touches: ["separated", "intersecting"],
+        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided.
         evidence: Option<&'static str> = evidence_name,
+        /// The reason why the verdict is undecided, in a word, such as "budget"; else None.
         reason: Option<&'static str> = reason_name,
+        /// A place where the two touch, in the world; None if they are apart or undecided.
         witness: Option<[f64; 3]> = vector,
+        /// The unit normal of the first thing at the witness, in the world; None if it has none.
         normal_a: Option<[f64; 3]> = vector,
+        /// The unit normal of the second thing at the witness, in the world; None if it has none.
         normal_b: Option<[f64; 3]> = vector,
+        /// The distance of the witness from the two surfaces, a length; None without a witness.
         residual: Option<f64> = number,
+        /// A proven lower bound of the distance of the two, a length; None without a proof.
         gap: Option<f64> = number,
+        /// The length within which two scans can not be told apart: their greater sampling radius.
         band: f64 = plain,
+        /// The likelihood of contact, from 0 to 1, if a limit ended the search; else None.
         likelihood: Option<f64> = number,
+        /// The index of a point (of a triangle, for a mesh) of the first thing near the witness, in its
+        /// input; None without one.
         source_a: Option<i64> = index,
+        /// The same for the second thing.
         source_b: Option<i64> = index,
+        /// The number of evaluations of the surface.
         evaluations: u64 = plain,
+        /// The number of pairs of nodes that were compared.
         node_pairs: u64 = plain,
+        /// The number of pairs of leaves that were compared.
         leaf_pairs: u64 = plain,
     }
 }
@@ -191,17 +206,29 @@ impl DistanceRecord {
 answer! {
     /// The answer of `distance`.
     Distance of DistanceRecord by distance_in_words {
+        /// A lower bound of the distance, a length; 0 if the two may touch.
         lower: f64 = plain,
+        /// An upper bound of the distance: that of the two points.
         upper: f64 = plain,
+        /// A point of the first thing, in the world.
         point_a: [f64; 3] = plain,
+        /// A point of the second thing near it, in the world.
         point_b: [f64; 3] = plain,
+        /// The length within which two scans can not be told apart: their greater sampling radius.
         band: f64 = plain,
+        /// The index of the point (of the triangle, for a mesh) of the first thing, in its input.
         source_a: i64 = plain,
+        /// The same for the second thing.
         source_b: i64 = plain,
+        /// How well the lower bound is supported: "certified" or "estimated".
         evidence: Option<&'static str> = evidence_name,
+        /// False if a limit ended the search before the bounds were as near as requested.
         complete: bool = is_one,
+        /// The number of evaluations of the surface.
         evaluations: u64 = plain,
+        /// The number of pairs of nodes that were compared.
         node_pairs: u64 = plain,
+        /// The number of pairs of leaves that were compared.
         leaf_pairs: u64 = plain,
     }
 }

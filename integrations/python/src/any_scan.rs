@@ -226,8 +226,8 @@ impl AnyScan {
         array(py, found.contacts.iter().map(ContactRecord::new).collect())
     }
 
-    /// Return up to eight contact points for a physics solver, the deepest first, as a structured
-    /// array of shape (N,).
+    /// Return up to eight contact points for a physics solver, as a structured array of shape (N,): the
+    /// deepest first, then always the one furthest from those before.
     ///
     /// Its fields are `point`, `normal` (the direction in which this scan moves out of `other`), `gap`
     /// (negative for penetration), `source_a` and `source_b`. Options are those of `collide`.

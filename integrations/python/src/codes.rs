@@ -4,6 +4,8 @@
 //! impact), 0 apart (or free), -1 undecided. Of evidence: 1 certified, 0 estimated, -1 none.
 
 use nearmiss::{Evidence, Reason, SweepReason};
+use pyo3::PyErr;
+use pyo3::exceptions::PyTypeError;
 
 /// Names of the reasons, by their codes from 1.
 const REASONS: [&str; 8] =
@@ -87,7 +89,7 @@ pub(crate) const NOWHERE: [f64; 3] = [NONE; 3];
 macro_rules! answer {
     ($(#[$about:meta])* $class:ident of $record:ident by $repr:ident {
         $(@verdict $touches:ident: $names:expr,)?
-        $($field:ident: $of:ty = $read:expr),* $(,)?
+        $($(#[$what:meta])* $field:ident: $of:ty = $read:expr),* $(,)?
     }) => {
         $(#[$about])*
         #[pyclass(frozen, module = "nearmiss")]
@@ -111,6 +113,7 @@ macro_rules! answer {
             )?
 
             $(
+                $(#[$what])*
                 #[getter]
                 fn $field(&self) -> $of {
                     $read(self.0.$field)
@@ -120,11 +123,22 @@ macro_rules! answer {
             fn __repr__(&self) -> String {
                 format!("<{} {}>", stringify!($class), $repr(&self.0))
             }
+
+            // Every object is true by default, also the answer that two things are apart.
+            fn __bool__(&self) -> PyResult<bool> {
+                let properties = [$(stringify!($touches),)? $(stringify!($field)),*];
+                Err($crate::codes::no_truth_value(stringify!($class), properties[0]))
+            }
         }
     };
 }
 
 pub(crate) use answer;
+
+/// Returns the error of an answer that is used as a condition.
+pub(crate) fn no_truth_value(class: &str, property: &str) -> PyErr {
+    PyTypeError::new_err(format!("expected a condition, such as `answer.{property}`, got an {class}"))
+}
 
 /// Reads a field as it is.
 pub(crate) const fn plain<T: Copy>(value: T) -> T {

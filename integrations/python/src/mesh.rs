@@ -48,10 +48,6 @@ impl Mesh {
 
 #[pymethods]
 impl Mesh {
-    /// Prepare triangles: vertices of shape (N, 3) and their indices of shape (M, 3).
-    ///
-    /// Vertices at one place are welded, those up to `weld` apart too. Triangles without area and
-    /// repeated ones are dropped. Takes about 0.1 s for 100,000 triangles.
     #[new]
     #[pyo3(signature = (vertices, triangles, *, weld = 0.0))]
     fn new(vertices: &Bound<'_, PyAny>, triangles: &Bound<'_, PyAny>, weld: f64) -> PyResult<Self> {

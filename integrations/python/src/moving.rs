@@ -22,6 +22,13 @@ use crate::things::AnyScan;
 /// frame. Threads may share it: a question that begins during a change waits until it is complete, and a
 /// question in progress keeps its frame, of which the change makes a copy. So an answer is about one whole
 /// frame, and no question fails because of a change.
+///
+/// Prepared from the first frame: points of shape (N, 3), float32 or float64.
+///
+/// `drop_invalid` drops points that are not finite, which raise `ValueError` otherwise; the frames of
+/// `move_to` then have the other points. Options: `radius_neighbours` (3 to 32, default 6) and `reach`
+/// (the widest gap that is bridged, a length), which later frames keep. Takes as long as `Scan`; Ctrl-C
+/// interrupts it.
 #[pyclass(frozen, extends = AnyScan, module = "nearmiss")]
 #[derive(Debug)]
 pub(crate) struct MovingScan(Arc<Moving>);
@@ -47,12 +54,6 @@ const REPLACED: &str = "replaced";
 
 #[pymethods]
 impl MovingScan {
-    /// Prepare the first frame: points of shape (N, 3), float32 or float64.
-    ///
-    /// `drop_invalid` drops points that are not finite, which raise `ValueError` otherwise; the frames of
-    /// `move_to` then have the other points. Options: `radius_neighbours` (3 to 32, default 6) and `reach`
-    /// (the widest gap that is bridged, a length), which later frames keep. Takes as long as `Scan`; Ctrl-C
-    /// interrupts it.
     #[new]
     #[pyo3(signature = (points, *, drop_invalid = false, **options))]
     fn new(

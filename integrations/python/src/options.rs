@@ -63,6 +63,11 @@ impl Options {
                 options.set(&name, &value)?;
             }
         }
+        let is_set = |name: &str| Ok::<_, PyErr>(given.get_item(name)?.is_some_and(|value| !value.is_none()));
+        if options.collide.semantics == Semantics::Surface && is_set("surface_only")? && is_set("thickened")?
+        {
+            return Err(refused("expected `thickened` or `surface_only`, got both; leave one of them out"));
+        }
         Ok(options)
     }
 

@@ -43,10 +43,15 @@ answer! {
     /// The answer of `Target.touch`.
     ShapeAnswer of ShapeRecord by touch_in_words {
         @verdict touches: ["separated", "touching"],
+        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided.
         evidence: Option<&'static str> = evidence_name,
+        /// The reason why the verdict is undecided, in a word; else None.
         reason: Option<&'static str> = reason_name,
+        /// A place of the scan that touches the shape, in the world; None if they are apart.
         point: Option<[f64; 3]> = vector,
+        /// The index of the scanned point at that place, in the input; None if they are apart.
         source: Option<i64> = index,
+        /// The length within which a shape and a scan can not be told apart.
         band: f64 = plain,
     }
 }
@@ -104,12 +109,19 @@ impl ShapeDistanceRecord {
 answer! {
     /// The answer of `Target.distance`.
     ShapeDistance of ShapeDistanceRecord by shape_distance_in_words {
+        /// A lower bound of the distance, a length; 0 if the two may touch.
         lower: f64 = plain,
+        /// An upper bound of the distance: that of the two points.
         upper: f64 = plain,
+        /// The nearest place of the scan, in the world; None if it is too far.
         point: Option<[f64; 3]> = vector,
+        /// The nearest place of the shape, in the world; None if it is too far.
         point_of_shape: Option<[f64; 3]> = vector,
+        /// The index of the scanned point at the nearest place, in the input; None if it is too far.
         source: Option<i64> = index,
+        /// The length within which a shape and a scan can not be told apart; None if it is too far.
         band: Option<f64> = number,
+        /// How well the lower bound is supported: "certified" or "estimated".
         evidence: Option<&'static str> = evidence_name,
     }
 }
@@ -169,11 +181,17 @@ impl RayRecord {
 answer! {
     /// The answer of `Target.cast`.
     RayAnswer of RayRecord by ray_in_words {
+        /// True if the ray hits the scan.
         hit: bool = is_one,
+        /// The distance from the origin to the hit, in lengths of the direction; None without a hit.
         t: Option<f64> = number,
+        /// The place that is hit, in the world; None without a hit.
         point: Option<[f64; 3]> = vector,
+        /// The unit normal there, on the side from which the ray comes; None without a hit.
         normal: Option<[f64; 3]> = vector,
+        /// The index of the scanned point at the hit, in the input; None without a hit.
         source: Option<i64> = index,
+        /// How well the answer is supported: "certified" or "estimated".
         evidence: Option<&'static str> = evidence_name,
     }
 }

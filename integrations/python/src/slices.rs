@@ -27,7 +27,14 @@ record! {
     }
 }
 
-/// A slice map.
+/// A slice map: a building as a stack of images of its floors and obstacles, for walking avatars.
+///
+/// Built from points of shape (N, 3).
+///
+/// `pixel` is the side of a pixel, a length; by default the longer side of the map has 700 pixels.
+/// `slice_height` is three pixels by default. `up` is x, y, z, -x, -y or -z. A pixel whose surface is
+/// steeper than `max_slope` degrees is an obstacle; `noise` is the height that a level floor spans,
+/// estimated by default.
 #[pyclass(frozen, module = "nearmiss")]
 #[derive(Debug)]
 pub(crate) struct SliceMap(Map);
@@ -40,12 +47,6 @@ fn avatar(size: [f64; 3], climb: f64) -> PyResult<Avatar> {
 
 #[pymethods]
 impl SliceMap {
-    /// Build a map from points of shape (N, 3).
-    ///
-    /// `pixel` is the side of a pixel, a length; by default the longer side of the map has 700 pixels.
-    /// `slice_height` is three pixels by default. `up` is x, y, z, -x, -y or -z. A pixel whose surface is
-    /// steeper than `max_slope` degrees is an obstacle; `noise` is the height that a level floor spans,
-    /// estimated by default.
     #[new]
     #[pyo3(signature = (points, *, pixel = None, slice_height = None, up = "z", max_slope = 45.0, noise = None))]
     fn new(

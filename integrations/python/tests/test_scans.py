@@ -143,6 +143,27 @@ class Questions(unittest.TestCase):
             distance = scan.distance(scan, at[i])
             self.assertEqual((distance.lower, distance.upper), (distances["lower"][i], distances["upper"][i]))
 
+    def test_answers_are_no_conditions(self):
+        scan = dragon()
+        for answer in (scan.collide(scan), scan.distance(scan), scan.target().cast([0, 0, 1], [0, 0, -1])):
+            with self.assertRaisesRegex(TypeError, "expected a condition, such as `answer"):
+                bool(answer)
+
+    def test_balls_and_surfaces_exclude_each_other(self):
+        scan = dragon()
+        with self.assertRaisesRegex(ValueError, "expected `thickened` or `surface_only`, got both"):
+            scan.collide(scan, thickened=0.01, surface_only=True)
+        balls = scan.collide(scan, thickened=0.01, surface_only=False)
+        self.assertEqual(balls.evidence, scan.collide(scan, thickened=0.01).evidence)
+
+    def test_classes_and_properties_are_described(self):
+        for name in ("Scan", "MovingScan", "Mesh", "SliceMap"):
+            self.assertIn("of shape (N, 3)", getattr(nearmiss, name).__doc__, name)
+        for name in ("Answer", "Distance", "ShapeAnswer", "ShapeDistance", "RayAnswer", "SweepAnswer"):
+            for field, value in vars(getattr(nearmiss, name)).items():
+                if not field.startswith("_"):
+                    self.assertTrue(value.__doc__, f"{name}.{field}")
+
     def test_poses_have_many_forms(self):
         scan = dragon()
         turn, shift = poses(2, 1, 0.0)[0, :3, :3], np.array([0.1, 0.02, 0.01])

@@ -4,33 +4,39 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-type Failure = Box<dyn std::error::Error>;
+use crate::common::Failure;
 
-/// The energy of each step: the kinetic one, and that of height above its end, in joules.
+/// Says what the curves are.
+const CAPTION: &str = "Energy of all bodies. Kinetic + potential: the difference from its least value.";
+
+/// The kinetic energy and the potential energy above z = 0 at each step, in joules.
 pub(crate) struct Record {
     pub(crate) name: &'static str,
     pub(crate) steps: Vec<[f64; 2]>,
 }
 
-/// Draws the energy above that at the end of the first record: kinetic and in all, over seconds.
+/// Draws the kinetic energy and the sum of kinetic and potential energy, over seconds. The least sum of all
+/// records is drawn as zero.
 pub(crate) fn plot(records: &[Record], path: &Path) -> Result<(), Failure> {
     let sums = |record: &Record| record.steps.iter().map(|[k, p]| k + p).collect::<Vec<f64>>();
-    let floor =
-        records.iter().filter_map(|record| sums(record).last().copied()).fold(f64::INFINITY, f64::min);
-    let top = records.iter().flat_map(sums).fold(0.0, f64::max) - floor;
+    let floor = records.iter().flat_map(sums).fold(f64::INFINITY, f64::min);
+    // The kinetic energy of a body that falls forever exceeds all sums.
+    let kinetic = records.iter().flat_map(|record| &record.steps).map(|[kinetic, _]| *kinetic);
+    let top = records.iter().flat_map(sums).map(|sum| sum - floor).chain(kinetic).fold(0.0, f64::max);
     let steps = records.iter().map(|record| record.steps.len()).max().unwrap_or(0);
     let seconds = |step: usize| f64::from(u32::try_from(step).unwrap_or(u32::MAX)) / 60.0;
     let area = SVGBackend::new(path, (900, 520)).into_drawing_area();
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&area)
         .margin(16)
+        .caption(CAPTION, ("sans-serif", 17))
         .x_label_area_size(44)
         .y_label_area_size(72)
         .build_cartesian_2d(0.0..seconds(steps), 0.0..top * 1.05)?;
     chart
         .configure_mesh()
         .x_desc("time, s")
-        .y_desc("energy above the end, J")
+        .y_desc("energy, J")
         .label_style(("sans-serif", 15))
         .light_line_style(WHITE)
         .draw()?;
@@ -40,7 +46,7 @@ pub(crate) fn plot(records: &[Record], path: &Path) -> Result<(), Failure> {
         let total: Vec<_> = totals.enumerate().map(|(step, joules)| (seconds(step), joules)).collect();
         let kinetic: Vec<_> =
             record.steps.iter().enumerate().map(|(step, [joules, _])| (seconds(step), *joules)).collect();
-        let parts = [("all", total, 3), ("kinetic", kinetic, 1)];
+        let parts = [("kinetic + potential", total, 3), ("kinetic", kinetic, 1)];
         for (part, series, width) in parts {
             chart
                 .draw_series(LineSeries::new(series, colour.stroke_width(width)))?

@@ -1,8 +1,10 @@
-//! Two hundred bodies fall onto a scan: `cargo run --release -p nearmiss-parry --example drop -- SCAN.nm
-//! [PICTURE.png]`. The scan is in metres, z up. `-` in place of a scan is the scan of a small house.
+//! Two hundred bodies fall onto a scan: `cargo run --release -p nearmiss-parry --example drop -- SCAN
+//! [PICTURE.png]`. The scan is in metres, z up: a prepared scan (`.nm`), or a point cloud in any format that
+//! nearmiss reads. `-` in place of a scan is the scan of a small house.
 //!
-//! Prints energy, depths and the time of a step. Draws the scene after 0, 0.5, 2 and 10 seconds, and the
-//! energy over time as `PICTURE.svg`.
+//! Prints energy, depths, the number of bodies below the whole scan, and the time of a step. Draws the
+//! scene after 0, 0.5, 2 and 10 seconds, from above and from the side, and the energy over time as
+//! `PICTURE.svg`.
 
 #![expect(
     clippy::print_stdout,
@@ -10,6 +12,8 @@
     reason = "a program may print and read the clock"
 )]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod energy;
 mod picture;
 mod world;
@@ -17,10 +21,11 @@ mod world;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
+use std::process::ExitCode;
 use std::time::Instant;
 
+use common::Failure;
 use nearmiss::geometry::PointCloud;
-use nearmiss::store::Check;
 use nearmiss::{BuildOptions, Pose, Ray, Scan, Scratch, Shape, ShapePlan, Target};
 use nearmiss_parry::ScanShape;
 use nearmiss_testdata::house::{Quad, house, scanned};
@@ -31,20 +36,22 @@ use rapier3d::math::Vector;
 use rapier3d::parry::shape::{SharedShape, TriMesh};
 use world::Drop;
 
-type Failure = Box<dyn std::error::Error>;
-
 /// The distance of neighbouring points of the house.
 const SPACING: f64 = 0.05;
 
 /// The steps after which the scene is drawn, sixty a second.
 const SHOWN: [u32; 4] = [0, 30, 120, 600];
 
-fn main() -> Result<(), Failure> {
+fn main() -> ExitCode {
+    common::finish(run())
+}
+
+fn run() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1);
     let quads = house();
     let path = words.next().filter(|path| path != "-");
     let scan = match &path {
-        Some(path) => Scan::open(path, Check::Full)?,
+        Some(path) => common::open(path)?.0,
         None => {
             let cloud = PointCloud::from_positions(&scanned(&quads, SPACING, 0.0, 7))?;
             Scan::build(&cloud, &BuildOptions::default())?
@@ -52,12 +59,12 @@ fn main() -> Result<(), Failure> {
     };
     let places = places(&scan, 200)?;
     println!("{} points, {} bodies, sampling radius {:.3}", scan.len(), places.len(), scan.sampling_radius());
-    let (strip, energy) = fall(&scan, ScanShape::new(scan.clone())?.shared(), &places)?;
+    let (strip, energy) = fall(&scan, ScanShape::new(scan.clone())?.shared(), &places);
     let mut records = vec![energy::Record { name: "on the scan", steps: energy }];
     if path.is_none() {
         let exact = mesh(&quads)?;
         println!("the same on a mesh of {} triangles", exact.indices().len());
-        let (_, energy) = fall(&scan, SharedShape::new(exact), &places)?;
+        let (_, energy) = fall(&scan, SharedShape::new(exact), &places);
         records.push(energy::Record { name: "on the mesh", steps: energy });
     }
     if let Some(path) = words.next() {
@@ -93,9 +100,9 @@ fn mesh(quads: &[Quad]) -> Result<TriMesh, Failure> {
 type Fallen = (Vec<(f64, Vec<Vector>)>, Vec<[f64; 2]>);
 
 /// Lets bodies fall for ten seconds, and prints what becomes of them.
-fn fall(scan: &Scan, ground: SharedShape, places: &[[f32; 3]]) -> Result<Fallen, Failure> {
+fn fall(scan: &Scan, ground: SharedShape, places: &[[f32; 3]]) -> Fallen {
     let mut drop = Drop::new(ground, places, 11);
-    println!("seconds, kinetic J, kinetic and potential J, deepest contact, fastest, lost, ms a step");
+    println!("seconds, kinetic J, kinetic and potential J, deepest contact, fastest, fell out, ms a step");
     let (mut strip, mut energy) = (Vec::new(), Vec::new());
     let mut took = 0.0;
     for step in 0..=600 {
@@ -106,17 +113,17 @@ fn fall(scan: &Scan, ground: SharedShape, places: &[[f32; 3]]) -> Result<Fallen,
         energy.push([kinetic, potential]);
         if step % 60 == 0 {
             let fastest = drop.speeds().into_iter().fold(0.0, f32::max);
-            let lost = lost(scan, &drop)?;
+            let out = fell_out(scan, &drop);
             let (second, total, mean) = (step / 60, kinetic + potential, took / 60.0);
             let deepest = drop.deepest();
-            println!("{second}, {kinetic:.4}, {total:.1}, {deepest:.4}, {fastest:.4}, {lost}, {mean:.2}");
+            println!("{second}, {kinetic:.4}, {total:.1}, {deepest:.4}, {fastest:.4}, {out}, {mean:.2}");
             took = 0.0;
         }
         let clock = Instant::now();
         drop.world.step();
         took += clock.elapsed().as_secs_f64() * 1000.0;
     }
-    Ok((strip, energy))
+    (strip, energy)
 }
 
 /// Free places above points of the scan that look up, from a fixed seed.
@@ -162,14 +169,8 @@ fn single(place: [f64; 3]) -> [f32; 3] {
     place.map(|c| c as f32)
 }
 
-/// The number of bodies with nothing of the scan within half a metre below.
-fn lost(scan: &Scan, drop: &Drop) -> Result<usize, Failure> {
-    let plan = ShapePlan::new(&nearmiss::CollideOptions::estimated(), scan)?;
-    let target = Target::new(scan.at(&Pose::IDENTITY), &plan);
-    let mut scratch = Scratch::default();
-    let mut is_lost = |place: &Vector| {
-        let below = Shape::Sphere { centre: place.to_array().map(f64::from), radius: 0.5 };
-        target.touch(&below, &mut scratch).verdict.is_separated()
-    };
-    Ok(drop.positions().iter().map(|place| usize::from(is_lost(place))).sum())
+/// The number of bodies below the whole scan: they fell through a hole, or off an edge.
+fn fell_out(scan: &Scan, drop: &Drop) -> usize {
+    let lowest = scan.bounds().min[2];
+    drop.positions().iter().filter(|place| f64::from(place.z) < lowest).count()
 }

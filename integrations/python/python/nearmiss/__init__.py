@@ -9,8 +9,9 @@ uniform scale; a rotation with ``as_matrix()``, as scipy has it; or a pair (rota
     >>> scan.collide(scan, nearmiss.pose(translation=[0.24, 0, 0]))
     <Answer apart by at least 0.035..., certified>
 
-Bad input raises ``ValueError``, a file that cannot be read or written ``OSError``. Queries release
-the interpreter's lock, so threads run at the same time.
+Values that cannot be used raise ``ValueError``, arguments of a wrong kind ``TypeError``, a file that
+cannot be read or written ``OSError``. Queries release the interpreter's lock, so threads run at the
+same time.
 """
 
 from __future__ import annotations
@@ -71,6 +72,6 @@ def read(path: str | os.PathLike[str], **options: Any) -> Scan:
 
     ``options`` are those of ``Scan.read``, or of ``Scan.open`` for a prepared file.
     """
-    if os.fspath(path).endswith(".nm"):
+    if os.fsdecode(path).lower().endswith(".nm"):
         return Scan.open(path, **options)
     return Scan.read(path, **options)

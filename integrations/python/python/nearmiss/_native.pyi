@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, SupportsFloat, TypeAlias, TypedDict, overload
+from typing import Any, Literal, NoReturn, SupportsFloat, TypeAlias, TypedDict, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,6 +58,7 @@ class _DistanceOptions(_SweepOptions, total=False):
     relative: float
 
 class Answer:
+    def __bool__(self) -> NoReturn: ...
     @property
     def verdict(self) -> Literal["separated", "intersecting", "undecided"]: ...
     @property
@@ -92,6 +93,7 @@ class Answer:
     def leaf_pairs(self) -> int: ...
 
 class Distance:
+    def __bool__(self) -> NoReturn: ...
     @property
     def lower(self) -> float: ...
     @property
@@ -118,6 +120,7 @@ class Distance:
     def leaf_pairs(self) -> int: ...
 
 class ShapeAnswer:
+    def __bool__(self) -> NoReturn: ...
     @property
     def verdict(self) -> Literal["separated", "touching", "undecided"]: ...
     @property
@@ -134,6 +137,7 @@ class ShapeAnswer:
     def band(self) -> float: ...
 
 class ShapeDistance:
+    def __bool__(self) -> NoReturn: ...
     @property
     def lower(self) -> float: ...
     @property
@@ -150,6 +154,7 @@ class ShapeDistance:
     def evidence(self) -> _Evidence | None: ...
 
 class RayAnswer:
+    def __bool__(self) -> NoReturn: ...
     @property
     def hit(self) -> bool: ...
     @property
@@ -164,6 +169,7 @@ class RayAnswer:
     def evidence(self) -> _Evidence: ...
 
 class SweepAnswer:
+    def __bool__(self) -> NoReturn: ...
     @property
     def verdict(self) -> Literal["free", "impact", "undecided"]: ...
     @property

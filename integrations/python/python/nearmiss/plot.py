@@ -66,7 +66,7 @@ def contact(
 
 
 def clearance(distances: NDArray[Any], times: ArrayLike | None = None, *, axes: Any = None) -> Any:
-    """Draw the bounds of distances along a path, as ``Scan.distance`` returns them for many poses."""
+    """Draw the bounds of distances along a path, as ``Scan.distance_each`` returns them."""
     pyplot = _pyplot()
     if axes is None:
         axes = pyplot.figure().add_subplot()
