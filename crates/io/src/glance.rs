@@ -7,8 +7,9 @@ use std::path::Path;
 use nearmiss_geometry::Aabb;
 
 use crate::columns::Row;
-use crate::format::{Format, recognise};
+use crate::format::Format;
 use crate::read::{BYTE_ORDER_MARK, check_file};
+use crate::recognise::recognise;
 use crate::rows::{Encoding, Layout};
 use crate::text::Lines;
 use crate::{las, npy, obj, off, pcd, ply, stl, xyz};

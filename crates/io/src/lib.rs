@@ -3,6 +3,7 @@
 
 mod glance;
 mod read;
+mod recognise;
 mod rows;
 
 mod error;

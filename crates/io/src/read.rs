@@ -12,11 +12,12 @@ use crate::e57;
 #[cfg(not(all(feature = "e57", feature = "gltf")))]
 use crate::error::Fault;
 use crate::error::ReadError;
-use crate::format::{Format, recognise};
+use crate::format::Format;
 #[cfg(feature = "gltf")]
 use crate::gltf;
 use crate::input::{Input, Stop};
 use crate::points::Points;
+use crate::recognise::recognise;
 use crate::selection::Selection;
 use crate::sink::{Model, Sink};
 use crate::{las, npy, obj, off, pcd, ply, stl, xyz};

@@ -16,12 +16,13 @@ use crate::things::AnyScan;
 ///
 /// Prepared from points of shape (N, 3), float32 or float64; those that are contiguous are not copied.
 ///
-/// `normals` has shape (N, 3); a graph turns those that it computes to the same side. `drop_invalid` drops points that are not finite, which raise
-/// `ValueError` otherwise. `progress` is called with the share that is done, from 0 to 1, anew for a
-/// graph. Options: `radius_neighbours` (3 to 32, default 6), `reach` (the widest gap that is bridged,
-/// a length), `graph` (orient the normals), `scanner` (a position of shape (3,) that normals face;
-/// implies `graph`), `close_pairs` (distances along the surface; implies `graph`). Takes about 1.5 s
-/// for a million points on two cores; Ctrl-C interrupts it.
+/// `normals` has shape (N, 3); with a graph, the computed normals are turned to their side.
+/// `drop_invalid` drops points that are not finite, which raise `ValueError` otherwise. `progress` is
+/// called with the share that is done, from 0 to 1, anew for a graph. Options: `radius_neighbours` (3
+/// to 32, default 6), `reach` (the widest gap that is bridged, a length), `graph` (orient the normals),
+/// `scanner` (a position of shape (3,) that normals face; implies `graph`), `close_pairs` (distances
+/// along the surface; implies `graph`). Takes about 1.5 s for a million points on two cores; Ctrl-C
+/// interrupts it.
 #[pyclass(frozen, extends = AnyScan, module = "nearmiss")]
 #[derive(Debug)]
 pub(crate) struct Scan(pub(crate) Prepared);

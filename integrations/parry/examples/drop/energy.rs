@@ -7,7 +7,7 @@ use plotters::prelude::*;
 use crate::common::Failure;
 
 /// Says what the curves are.
-const CAPTION: &str = "Energy of all bodies. Kinetic + potential: the difference from its least value.";
+const CAPTION: &str = "Energy of all bodies. Kinetic + potential energy counts from its least value.";
 
 /// The kinetic energy and the potential energy above z = 0 at each step, in joules.
 pub(crate) struct Record {
@@ -23,6 +23,8 @@ pub(crate) fn plot(records: &[Record], path: &Path) -> Result<(), Failure> {
     // The kinetic energy of a body that falls forever exceeds all sums.
     let kinetic = records.iter().flat_map(|record| &record.steps).map(|[kinetic, _]| *kinetic);
     let top = records.iter().flat_map(sums).map(|sum| sum - floor).chain(kinetic).fold(0.0, f64::max);
+    // Room for the frame below and above the curves.
+    let range = -0.03 * top..1.05 * top;
     let steps = records.iter().map(|record| record.steps.len()).max().unwrap_or(0);
     let seconds = |step: usize| f64::from(u32::try_from(step).unwrap_or(u32::MAX)) / 60.0;
     let area = SVGBackend::new(path, (900, 520)).into_drawing_area();
@@ -32,7 +34,7 @@ pub(crate) fn plot(records: &[Record], path: &Path) -> Result<(), Failure> {
         .caption(CAPTION, ("sans-serif", 17))
         .x_label_area_size(44)
         .y_label_area_size(72)
-        .build_cartesian_2d(0.0..seconds(steps), 0.0..top * 1.05)?;
+        .build_cartesian_2d(0.0..seconds(steps), range)?;
     chart
         .configure_mesh()
         .x_desc("time, s")
