@@ -33,12 +33,13 @@ pub(crate) fn plot(records: &[Record], path: &Path) -> Result<(), Failure> {
         .margin(16)
         .caption(CAPTION, ("sans-serif", 17))
         .x_label_area_size(44)
-        .y_label_area_size(72)
+        .y_label_area_size(92)
         .build_cartesian_2d(0.0..seconds(steps), range)?;
     chart
         .configure_mesh()
         .x_desc("time, s")
         .y_desc("energy, J")
+        .y_label_formatter(&|joules| format!("{joules:.0}"))
         .label_style(("sans-serif", 15))
         .light_line_style(WHITE)
         .draw()?;
@@ -58,6 +59,7 @@ pub(crate) fn plot(records: &[Record], path: &Path) -> Result<(), Failure> {
     }
     chart
         .configure_series_labels()
+        .position(SeriesLabelPosition::UpperMiddle)
         .label_font(("sans-serif", 16))
         .background_style(WHITE)
         .border_style(RGBColor(200, 200, 200))
