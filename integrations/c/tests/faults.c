@@ -24,7 +24,7 @@ static void files(NearmissScan *scan) {
     FAILS(nearmiss_scan_from_bytes(NULL, 9, 0, &again), NEARMISS_STATUS_NULL, "bytes");
     FAILS(nearmiss_scan_open("missing.nm", 0, &again), NEARMISS_STATUS_IO, "missing.nm");
     FAILS(nearmiss_scan_read("missing.ply", NULL, &again), NEARMISS_STATUS_IO, "missing.ply");
-    FAILS(nearmiss_scan_open(NULL, 0, &again), NEARMISS_STATUS_NULL, "path");
+    FAILS(nearmiss_scan_open(NULL, 0, &again), NEARMISS_STATUS_NULL, "file");
     FAILS(nearmiss_scan_open("\xff\xfe", 0, &again), NEARMISS_STATUS_ARGUMENT, "UTF-8");
     FAILS(nearmiss_scan_save(scan, "/nonexistent/folder/a.nm"), NEARMISS_STATUS_IO, "folder");
     free(bytes);
