@@ -106,7 +106,7 @@ static void handles(NearmissScan *scan) {
     NearmissBudget budget = {UINT64_MAX, NAN};
     FAILS(nearmiss_collide(plan, &a, &b, &budget, NULL, scratch, &answer), NEARMISS_STATUS_ARGUMENT, "seconds");
     NearmissContactList list = {NULL, 4, 0, false};
-    FAILS(nearmiss_contacts(plan, &a, &b, NULL, scratch, &list, &answer), NEARMISS_STATUS_NULL, "out");
+    FAILS(nearmiss_contacts(plan, &a, &b, NULL, scratch, &list, &answer), NEARMISS_STATUS_NULL, "places");
 
     const double nan[3] = {NAN, 0, 0}, origin[3] = {0, 0, 0};
     NearmissShape shapes[5] = {
