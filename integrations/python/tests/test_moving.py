@@ -72,10 +72,13 @@ class Frames(unittest.TestCase):
         self.assertIn("refitted>", repr(moving))
         self.assertTrue(0.5 < moving.looseness < 2.0, moving.looseness)
         self.assertEqual(moving.misplaced, 0.0)
+        # All lengths change, and the order stays good.
+        self.assertEqual(moving.move_to(0.5 * cloth(0.05)), "renewed")
+        self.assertEqual(moving.move_to(cloth(0.05)), "renewed")
         # All neighbours part.
         shuffled = np.random.default_rng(0).permutation(cloth(0.05))
-        self.assertEqual(moving.move_to(shuffled), "renewed")
-        self.assertEqual(moving.move_to(cloth(0.05)), "renewed")
+        self.assertEqual(moving.move_to(shuffled), "rebuilt")
+        self.assertEqual(moving.move_to(cloth(0.05)), "rebuilt")
         # A fifth of the points scatters: they are sparse, among those of the sheet.
         scattered = cloth(0.05)
         some = scattered[:, 0] >= 0.8
