@@ -264,8 +264,9 @@ impl<'q> Question<'q> {
         self
     }
 
-    /// Writes up to eight contact points to `points`, for a physics solver: the deepest first, then
-    /// always the one furthest from all previous ones. Leaves `points` empty unless the scans meet.
+    /// Writes up to eight contact points to `points`, for a physics solver. The first is the deepest; each
+    /// of the others is the candidate furthest from all earlier ones. Leaves `points` empty unless the
+    /// scans meet.
     #[inline]
     #[must_use]
     pub fn manifold(mut self, points: &'q mut Vec<ManifoldPoint>) -> Self {

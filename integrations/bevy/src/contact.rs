@@ -14,7 +14,7 @@ pub struct ScanContact {
     pub entities: [Entity; 2],
     /// Begin, course or end.
     pub phase: ContactPhase,
-    /// Points of contact with normals and gaps, as for a solver, the deepest first. None at the end.
+    /// Points of contact with normals and gaps, as for a solver; the first is the deepest. None at the end.
     pub points: Vec<ManifoldPoint>,
 }
 

@@ -71,7 +71,8 @@ impl Scans<'_, '_> {
         }
     }
 
-    /// Writes the contacts of a shape with all scans to `out`, up to eight of each, the deepest first.
+    /// Writes the contacts of a shape with all scans to `out`, up to eight of each. The first of each scan is
+    /// the deepest.
     pub fn contacts(&mut self, shape: &Shape<'_>, out: &mut Vec<(Entity, ShapeContact)>) {
         out.clear();
         let Working { scratch, near, contacts } = &mut *self.working;

@@ -1270,9 +1270,9 @@ NearmissStatus nearmiss_collide(const struct NearmissPlan *plan,
                                 struct NearmissAnswer *out);
 
 /*
- Like `nearmiss_collide`, and writes up to eight contact points for a physics solver to `list`: the
- deepest first, then always the one furthest from those before. Thread safety: as for
- `nearmiss_collide`.
+ Like `nearmiss_collide`, and writes up to eight contact points for a physics solver to `list`. The
+ first is the deepest; each of the others is the candidate furthest from all earlier ones. Thread
+ safety: as for `nearmiss_collide`.
 
  # Safety
  `list` is null or valid, and so are its places.
@@ -1387,8 +1387,8 @@ NearmissStatus nearmiss_shape_distance(const struct NearmissPlan *plan,
 
 /*
  Writes the contacts of a shape with a scan to `out`, as many as its capacity holds, and their number,
- at most eight, to `count`: the deepest first, then always the one furthest from those before. `hint`
- may be null. Thread safety: one call at a time for each scratch and each hint.
+ at most eight, to `count`. The first is the deepest; each of the others is the candidate furthest from
+ all earlier ones. `hint` may be null. Thread safety: one call at a time for each scratch and each hint.
 
  # Safety
  `out` are `capacity` places; other pointers are null or valid.

@@ -74,9 +74,9 @@ pub struct ContactList {
     pub complete: bool,
 }
 
-/// Like `nearmiss_collide`, and writes up to eight contact points for a physics solver to `list`: the
-/// deepest first, then always the one furthest from those before. Thread safety: as for
-/// `nearmiss_collide`.
+/// Like `nearmiss_collide`, and writes up to eight contact points for a physics solver to `list`. The
+/// first is the deepest; each of the others is the candidate furthest from all earlier ones. Thread
+/// safety: as for `nearmiss_collide`.
 ///
 /// # Safety
 /// `list` is null or valid, and so are its places.

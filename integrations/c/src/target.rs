@@ -267,8 +267,8 @@ pub unsafe extern "C" fn nearmiss_shape_distance(
 }
 
 /// Writes the contacts of a shape with a scan to `out`, as many as its capacity holds, and their number,
-/// at most eight, to `count`: the deepest first, then always the one furthest from those before. `hint`
-/// may be null. Thread safety: one call at a time for each scratch and each hint.
+/// at most eight, to `count`. The first is the deepest; each of the others is the candidate furthest from
+/// all earlier ones. `hint` may be null. Thread safety: one call at a time for each scratch and each hint.
 ///
 /// # Safety
 /// `out` are `capacity` places; other pointers are null or valid.

@@ -136,7 +136,7 @@ answer! {
         residual: Option<f64> = number,
         /// A proven lower bound of the distance of the two, a length; None without a proof.
         gap: Option<f64> = number,
-        /// The length within which two scans can not be told apart: their greater sampling radius.
+        /// The local spacing, below which the two do not determine the truth, a length.
         band: f64 = plain,
         /// The likelihood of contact, from 0 to 1, if a limit ended the search; else None.
         likelihood: Option<f64> = number,
@@ -214,7 +214,7 @@ answer! {
         point_a: [f64; 3] = plain,
         /// A point of the second thing near it, in the world.
         point_b: [f64; 3] = plain,
-        /// The length within which two scans can not be told apart: their greater sampling radius.
+        /// The local spacing, below which the two do not determine the truth, a length.
         band: f64 = plain,
         /// The index of the point (of the triangle, for a mesh) of the first thing, in its input.
         source_a: i64 = plain,

@@ -226,8 +226,8 @@ impl AnyScan {
         array(py, found.contacts.iter().map(ContactRecord::new).collect())
     }
 
-    /// Return up to eight contact points for a physics solver, as a structured array of shape (N,): the
-    /// deepest first, then always the one furthest from those before.
+    /// Return up to eight contact points for a physics solver, as a structured array of shape (N,).
+    /// The first is the deepest; each of the others is the candidate furthest from all earlier ones.
     ///
     /// Its fields are `point`, `normal` (the direction in which this scan moves out of `other`), `gap`
     /// (negative for penetration), `source_a` and `source_b`. Options are those of `collide`.

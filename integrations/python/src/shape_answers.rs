@@ -51,7 +51,7 @@ answer! {
         point: Option<[f64; 3]> = vector,
         /// The index of the scanned point at that place, in the input; None if they are apart.
         source: Option<i64> = index,
-        /// The length within which a shape and a scan can not be told apart.
+        /// The local spacing, below which the scan does not determine the truth, a length.
         band: f64 = plain,
     }
 }
@@ -119,7 +119,8 @@ answer! {
         point_of_shape: Option<[f64; 3]> = vector,
         /// The index of the scanned point at the nearest place, in the input; None if it is too far.
         source: Option<i64> = index,
-        /// The length within which a shape and a scan can not be told apart; None if it is too far.
+        /// The local spacing, below which the scan does not determine the truth, a length; None if it is too
+        /// far.
         band: Option<f64> = number,
         /// How well the lower bound is supported: "certified" or "estimated".
         evidence: Option<&'static str> = evidence_name,

@@ -117,7 +117,7 @@ answer! {
         upper: Option<f64> = number,
         /// The time at which that distance was found; None if none was measured.
         at: Option<f64> = number,
-        /// The length within which the two can not be told apart.
+        /// The local spacing, below which the two do not determine the truth, a length.
         band: f64 = plain,
         /// A place where the two touch at `t_hit`, in the world; None without an impact.
         witness: Option<[f64; 3]> = vector,

@@ -163,8 +163,8 @@ impl Target {
         })
     }
 
-    /// Return up to eight contacts of a shape, as a structured array of shape (N,): the deepest first, then
-    /// always the one furthest from those before.
+    /// Return up to eight contacts of a shape, as a structured array of shape (N,). The first is the
+    /// deepest; each of the others is the candidate furthest from all earlier ones.
     ///
     /// Its fields are `point`, `normal` (the direction in which the shape moves out), `depth` (negative
     /// for a gap within the margin) and `id`, which stays the same from frame to frame with a `hint`.
