@@ -13,6 +13,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, f64x2, f64x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
+use nearmiss_lanes::order::ascending;
 use nearmiss_lanes::parallel::{both, change_each};
 use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::{along, greatest, least};
@@ -275,11 +276,22 @@ fn extents_by<S: Simd>(simd: S, items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 
     (least_of, greatest_of)
 }
 
+/// The maximum number of points whose coordinates [`partition`] stores beside them.
+const KEYED: usize = 1 << 16;
+
 /// Moves the `left` points with the least coordinates along `axis` to the front; ties go to the
 /// lower index.
 fn partition(items: &mut [Item], axis: [f32; 3], left: usize) {
-    let key = |item: &Item| dot(axis, item.position);
-    items.select_nth_unstable_by(left, |a, b| key(a).total_cmp(&key(b)).then(a.index.cmp(&b.index)));
+    let key = |item: &Item| u64::from(ascending(dot(axis, item.position))) << 32 | u64::from(item.index);
+    if items.len() > KEYED {
+        items.select_nth_unstable_by_key(left, key);
+        return;
+    }
+    let mut keyed: Vec<(u64, Item)> = items.iter().map(|item| (key(item), *item)).collect();
+    keyed.select_nth_unstable_by_key(left, |(key, _)| *key);
+    for (item, (_, ordered)) in items.iter_mut().zip(keyed) {
+        *item = ordered;
+    }
 }
 
 /// Returns the principal axis whose median split gives the least volume, judged on an evenly spaced
@@ -316,4 +328,39 @@ fn best_axis(level: Level, items: &[Item], bounds: &OrientedBox, left: usize) ->
         }
     }
     axes[best.1]
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::rng;
+    use rand::RngExt;
+
+    use super::*;
+
+    #[test]
+    fn a_partition_is_that_of_sorted_points_with_and_without_stored_keys() {
+        let mut rng = rng(5);
+        for count in [2, 17, 600, KEYED, KEYED + 1] {
+            // Few places, also -0 beside 0, so that many points are level.
+            let place = |x: u32| [-1.0, -0.0, 0.0, 1.0][x as usize % 4];
+            let items: Vec<Item> = (0..id32(count))
+                .map(|index| Item { position: [(); 3].map(|()| place(rng.random())), index: index ^ 1 })
+                .collect();
+            for axis in [[1.0, 0.0, 0.0], [0.6, -0.48, 0.64]] {
+                let left = rng.random_range(1..count);
+                let mut expected = items.clone();
+                let key = |item: &Item| dot(axis, item.position);
+                expected.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.index.cmp(&b.index)));
+                let mut found = items.clone();
+                partition(&mut found, axis, left);
+                let indices = |items: &[Item]| {
+                    let mut indices: Vec<u32> = items.iter().map(|item| item.index).collect();
+                    indices.sort_unstable();
+                    indices
+                };
+                assert_eq!(indices(&found[..left]), indices(&expected[..left]), "{count} points");
+                assert_eq!(indices(&found[left..]), indices(&expected[left..]), "{count} points");
+            }
+        }
+    }
 }
