@@ -15,7 +15,7 @@ use crate::mesh::extents::boxes_of_triangles;
 use crate::mesh::moments::axes_of_nodes;
 use crate::mesh::options::{MeshBuildError, MeshBuildOptions};
 use crate::scan::outline::Ball;
-use crate::tree::split::{Item, split};
+use crate::tree::split::{Item, Size, split};
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Root, Siblings, Tree, siblings};
 
@@ -238,7 +238,7 @@ fn over(
     });
     let mut boxes = vec![OrientedBox::default(); topology.len()];
     let count = items.len();
-    split(&mut items, &topology, count, &mut boxes);
+    split(&mut items, &topology, count, Size::Diagonal, &mut boxes);
 
     let mut blocks = vec![TriangleBlock::zeroed(); topology.leaves()];
     fill(&mut blocks, |number| block(&topology, number, |i| corners_of(items[i].index as usize)));
