@@ -2,17 +2,21 @@
 //! of the likelihood.
 //!
 //! An object is queried against itself. `SCAN+OBJECT` queries an object in a scan, scaled to a
-//! twenty-fifth of the scan's diagonal.
+//! twenty-fifth of the scan's diagonal. With `--as-mesh`, the meshes of objects are queried.
 //!
 //! The check fails if a decile with a hundred answers or more is off by more than 0.15, or if the
 //! Brier score of all answers is not below that of the best constant.
 
-use nearmiss::{BuildOptions, Pose, Reason, Scan, Verdict};
+use nearmiss::{
+    Budget, BuildOptions, CollideOptions, Mesh, MeshBuildOptions, MeshPair, MeshScratch, MeshVerdict, Pose,
+    Reason, Scan, Verdict,
+};
 use nearmiss_benches::asked::{Asking, Limits};
 use nearmiss_benches::object::Object;
+use nearmiss_benches::questions::{self, Asked};
 use nearmiss_benches::rivals::ours::Ours;
 use nearmiss_benches::sample::count;
-use nearmiss_benches::{Failure, machine, questions};
+use nearmiss_benches::{Failure, machine};
 
 /// Budgets, in node pairs and evaluations.
 const BUDGETS: [u64; 8] = [1, 4, 8, 16, 32, 64, 128, 256];
@@ -71,13 +75,16 @@ pub(crate) struct Arguments {
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 2)]
     seed: u64,
+    /// Query the meshes of the objects
+    #[arg(long)]
+    as_mesh: bool,
     #[command(flatten)]
     asking: Asking,
 }
 
 /// Returns `true` if the check passes.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
-    let &Arguments { ref objects, near, swept, seed, asking } = arguments;
+    let &Arguments { ref objects, near, swept, seed, as_mesh, asking } = arguments;
     let options = asking.options();
     println!("{}", machine::description());
     println!(
@@ -90,31 +97,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     );
     for source in objects {
         let build = |object: &Object| Scan::build(&object.cloud, &BuildOptions::default());
-        let (name, scans, questions) = if let Some((room, body)) = source.split_once('+') {
+        let (name, answers) = if let Some((room, body)) = source.split_once('+') {
+            if as_mesh {
+                return Err("expected objects with `--as-mesh`, got an object in a scan".into());
+            }
             let (room, body) = (Object::read(room)?, Object::read(body)?);
             let scans = [build(&room)?, build(&body)?];
             let half = room.cloud.bounds().half_extents();
             let diagonal = half.iter().map(|x| x * x).sum::<f64>().sqrt();
             let longest = body.cloud.bounds().half_extents().into_iter().fold(0.0, f64::max);
             let asked = questions::in_room([&scans[0], &scans[1]], SHARE * diagonal / longest, near, seed)?;
-            (room.name, scans, asked)
+            (room.name, of_scans([&scans[0], &scans[1]], &options, &asked)?)
         } else {
             let object = Object::read(source)?.scaled()?;
             let scan = build(&object)?;
             let asked = questions::asked(&object, &scan, near, swept, seed)?;
-            (object.name, [scan.clone(), scan], asked)
+            let answers =
+                if as_mesh { of_mesh(&object, &asked)? } else { of_scans([&scan; 2], &options, &asked)? };
+            (object.name, answers)
         };
-        let mut answers = Answers::default();
-        for question in questions {
-            for work in BUDGETS {
-                let limits = Limits { work: Some(work), ..Limits::default() };
-                let asked = Ours::of([&scans[0], &scans[1]], &options)?;
-                let answer = asked.with_limits(limits).answer(&Pose::IDENTITY, &question.pose);
-                if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
-                    answers.0.push((likelihood, question.meets));
-                }
-            }
-        }
         row(&name, &answers);
         all.0.extend(answers.0);
     }
@@ -134,6 +135,40 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let good = all.worst() <= TOLERANCE && all.brier(|p| p) < all.brier(|_| constant);
     println!("\n{}", if good { "calibrated" } else { "FAILED: not calibrated" });
     Ok(good)
+}
+
+/// Queries two scans with all budgets.
+fn of_scans(scans: [&Scan; 2], options: &CollideOptions, asked: &[Asked]) -> Result<Answers, Failure> {
+    let mut answers = Answers::default();
+    for question in asked {
+        for work in BUDGETS {
+            let limits = Limits { work: Some(work), ..Limits::default() };
+            let answer =
+                Ours::of(scans, options)?.with_limits(limits).answer(&Pose::IDENTITY, &question.pose);
+            if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
+                answers.0.push((likelihood, question.meets));
+            }
+        }
+    }
+    Ok(answers)
+}
+
+/// Queries an object's mesh against itself with all budgets.
+fn of_mesh(object: &Object, asked: &[Asked]) -> Result<Answers, Failure> {
+    let mesh = object.mesh.as_ref().ok_or("expected an object with a mesh, got points")?;
+    let mesh = Mesh::build(mesh, &MeshBuildOptions::default())?;
+    let mut scratch = MeshScratch::default();
+    let mut answers = Answers::default();
+    for question in asked {
+        let pair = MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(&question.pose));
+        for work in BUDGETS {
+            let answer = pair.within(&Budget::UNLIMITED.with_work(work)).collide(&mut scratch);
+            if let MeshVerdict::Undecided(_) = answer.verdict {
+                answers.0.push((answer.likelihood, question.meets));
+            }
+        }
+    }
+    Ok(answers)
 }
 
 fn row(name: &str, answers: &Answers) {

@@ -66,6 +66,11 @@ impl Stack {
         self.keys.clear();
     }
 
+    /// Removes all pairs and returns them, the first pushed first.
+    pub fn drain(&mut self) -> impl Iterator<Item = Open> {
+        self.pairs.drain(..).zip(self.keys.drain(..)).map(|(pair, key)| Open { pair, key })
+    }
+
     /// Returns the remaining pairs, the next first.
     pub fn iter(&self) -> impl Iterator<Item = NodePair> {
         self.pairs.iter().rev().copied()

@@ -13,7 +13,7 @@ use crate::mesh::region::region;
 
 /// A search for triangles that meet.
 struct Search<'s, 'a> {
-    pair: MeshPairing<'a>,
+    pair: &'s mut MeshPairing<'a>,
     /// The triangles that were found to meet first.
     met: Option<[usize; 2]>,
     /// All contacts, if requested.
@@ -66,7 +66,7 @@ impl PairVisitor for Measuring<'_, '_, '_> {
     }
 
     fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open) -> ControlFlow<()> {
-        let pair = &mut self.search.pair;
+        let pair = &mut *self.search.pair;
         let (gaps, lanes) = (pair.least_distances(leaves), pair.lanes(leaves));
         for lane in Bits(lanes) {
             let mut gap = f64::from(gaps[lane]);
@@ -96,7 +96,7 @@ impl BoxVisitor for Measuring<'_, '_, '_> {
 
 /// Decides whether two meshes meet, from what `hint` knows if possible.
 pub(crate) fn collide(
-    pair: MeshPairing<'_>,
+    pair: &mut MeshPairing<'_>,
     stack: &mut Stack,
     mut hint: Option<&mut MeshHint>,
     contacts: Option<(&mut Vec<MeshContact>, &mut bool)>,
@@ -117,22 +117,21 @@ pub(crate) fn collide(
     }
     let (verdict, likelihood) = match search.met.and_then(|met| search.pair.contact(met)) {
         Some(contact) => (MeshVerdict::Intersecting(contact), 1.0),
-        None if ended => (MeshVerdict::Undecided(region(&search.pair, NodePair::ROOTS)), 0.5),
+        None if ended => (MeshVerdict::Undecided(region(search.pair, NodePair::ROOTS)), 0.5),
         None => (MeshVerdict::Separated, 0.0),
     };
     MeshAnswer { verdict, likelihood, statistics: search.pair.meter.spent }
 }
 
-/// Looks for two triangles that meet. Returns the pair, and breaks if the search was ended, by a
-/// contact or by the budget.
-pub(crate) fn first_met<'a>(
-    pair: MeshPairing<'a>,
+/// Looks for two triangles that meet. Breaks if the search was ended, by a contact or by the budget.
+pub(crate) fn first_met(
+    pair: &mut MeshPairing<'_>,
     stack: &mut Stack,
-) -> (MeshPairing<'a>, ControlFlow<()>, Option<[usize; 2]>) {
+) -> (ControlFlow<()>, Option<[usize; 2]>) {
     stack.clear();
     let mut search = Search { pair, met: None, all: None };
     let flow = search.run(stack);
-    (search.pair, flow, search.met)
+    (flow, search.met)
 }
 
 impl Search<'_, '_> {

@@ -45,7 +45,7 @@ struct Nearest {
 }
 
 struct Search<'s, 'a> {
-    pair: MeshPairing<'a>,
+    pair: &'s mut MeshPairing<'a>,
     relative_pose: &'s RelativePose,
     best: Nearest,
     /// Pairs whose boxes exceed the distance of the centres by this much cannot improve the best.
@@ -113,7 +113,7 @@ impl BoundVisitor<Nearness> for Search<'_, '_> {
 
 /// Bounds the distance of two meshes, from the nearest triangles of the last query if `hint` is given.
 pub(crate) fn distance(
-    pair: MeshPairing<'_>,
+    pair: &mut MeshPairing<'_>,
     open: &mut Frontier,
     hint: Option<&mut MeshHint>,
 ) -> MeshDistance {

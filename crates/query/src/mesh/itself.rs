@@ -75,11 +75,12 @@ impl<'a> MeshItself<'a> {
     fn ask<R>(
         &self,
         scratch: &mut MeshScratch,
-        ask: impl FnOnce(MeshPairing<'_>, &mut Stack) -> R,
+        ask: impl FnOnce(&mut MeshPairing<'_>, &mut Stack) -> R,
     ) -> Option<R> {
         let view = self.mesh.mesh().arrays();
         let (level, stack) = scratch.stack();
-        let pair = MeshPairing::new([self.mesh; 2], [&view; 2], &self.budget, level)?;
-        Some(ask(pair.of_itself(), stack))
+        let meshes = [self.mesh; 2];
+        let mut pair = MeshPairing::new(&meshes, [&view; 2], &self.budget, level)?.of_itself();
+        Some(ask(&mut pair, stack))
     }
 }

@@ -1,5 +1,7 @@
 //! Two prepared meshes under a relative pose, and the cost of a search.
 
+use std::cell::OnceCell;
+
 use fearless_simd::Level;
 use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{LEAF_TRIANGLES, MeshView, Relative, TreePair};
@@ -20,15 +22,15 @@ const LEAF_PAIR: u64 = 16;
 /// Two placed meshes, their arrays, the relative pose, and the cost of the search.
 #[derive(Debug)]
 pub(crate) struct MeshPairing<'a> {
-    pub(crate) meshes: [PlacedMesh<'a>; 2],
+    pub(crate) meshes: &'a [PlacedMesh<'a>; 2],
     pub(crate) a: &'a MeshView<'a>,
     pub(crate) b: &'a MeshView<'a>,
     /// The pose of b's stored frame in a's.
     pub(crate) stored: Pose,
     /// The same in single precision.
     pub(crate) relative: Relative,
-    /// The pose of b's input in the frame of a's input.
-    pose: Pose,
+    /// The pose of b's input in the frame of a's input, once it is needed.
+    pose: OnceCell<Pose>,
     /// A lower bound of the distance of the bounding balls, in the world.
     pub(crate) gap: f64,
     pub(crate) meter: Meter,
@@ -40,8 +42,9 @@ pub(crate) struct MeshPairing<'a> {
 
 impl<'a> MeshPairing<'a> {
     /// Returns `None` if a pose is invalid.
+    #[inline]
     pub(crate) fn new(
-        meshes: [PlacedMesh<'a>; 2],
+        meshes: &'a [PlacedMesh<'a>; 2],
         [a, b]: [&'a MeshView<'a>; 2],
         budget: &Budget,
         level: Level,
@@ -49,11 +52,21 @@ impl<'a> MeshPairing<'a> {
         let balls =
             PlacedBalls::of([meshes[0].stored_to_world(), meshes[1].stored_to_world()], [*a.ball, *b.ball])?;
         let (stored, relative) = balls.relative();
-        let pose = meshes[1].pose().relative_to(meshes[0].pose());
         let leaves = [a, b].map(|mesh| mesh.tree.topology().leaves() as u64);
         let meter = Meter::of_leaves(budget, leaves, LEAF_PAIR);
         let gap = balls.gap;
-        Some(Self { meshes, a, b, stored, relative, pose, gap, meter, level, is_of_itself: false })
+        Some(Self {
+            meshes,
+            a,
+            b,
+            stored,
+            relative,
+            pose: OnceCell::new(),
+            gap,
+            meter,
+            level,
+            is_of_itself: false,
+        })
     }
 
     /// The same pair, of a mesh with itself: only triangles without a common corner are compared,
@@ -74,7 +87,7 @@ impl<'a> MeshPairing<'a> {
 
     /// The identities of both meshes.
     fn things(&self) -> [u64; 2] {
-        self.meshes.map(|placed| placed.mesh().identity())
+        self.meshes.each_ref().map(|placed| placed.mesh().identity())
     }
 
     /// Returns `true` if a separation at an earlier pose still holds.
@@ -121,7 +134,8 @@ impl<'a> MeshPairing<'a> {
     /// Returns the corners of the `i`-th triangle of a and the `j`-th of b in the frame of a's input.
     #[inline]
     pub(crate) fn corners(&self, [i, j]: [usize; 2]) -> [Corners; 2] {
-        [self.a.corners(i), self.b.corners(j).map(|p| self.pose.apply(p))]
+        let pose = self.pose.get_or_init(|| self.meshes[1].pose().relative_to(self.meshes[0].pose()));
+        [self.a.corners(i), self.b.corners(j).map(|p| pose.apply(p))]
     }
 
     /// Counts two leaves, and returns the lanes of their triangle pairs that may meet; see

@@ -2,12 +2,12 @@
 //! that both surfaces are expected to fill, negated.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x16};
+use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{
-    Comparison, Frontier, MostUrgent, NodeBounds, NodePair, Open, PairVisitor, Part, Relative, Tree,
+    Comparison, Frontier, NodeBounds, NodePair, Open, PairVisitor, Part, Relative, Tree,
 };
-use nearmiss_lanes::wide::{Bits, bits, product, repeated, spread};
+use nearmiss_lanes::wide::{Bits, bits, cube_root, product, repeated, spread};
 
 use crate::pair::cell_table::expected;
 
@@ -15,9 +15,13 @@ const LANES: usize = 16;
 
 /// The callbacks of a descent by probability ([`Odds`]).
 pub(crate) trait OddsVisitor: PairVisitor {
-    /// Called with a pair whose boxes overlap, with the number of cells of their intersection that
-    /// each surface fills well.
-    fn overlapping(&mut self, pair: NodePair, filled: [f32; 2]);
+    /// Returns the least number of cells that both surfaces are expected to fill in pairs that
+    /// [`Self::likely`] is called with.
+    fn least_expected(&self) -> f32;
+
+    /// Called with the numbers of cells of the intersection of a pair's boxes that each surface fills
+    /// well.
+    fn likely(&mut self, filled: [f32; 2]);
 }
 
 /// Two trees under a relative pose, compared by the probability of a collision.
@@ -56,21 +60,22 @@ impl Odds<'_> {
         }
     }
 
-    /// The number of well-filled cells of a node.
-    #[inline]
-    fn filled(&self, which: usize, id: u32) -> f32 {
-        self.cells[which].get(id as usize).map_or(UNCOUNTED, |&count| f32::from(count))
+    /// The numbers of well-filled cells of four nodes.
+    #[inline(always)]
+    fn filled<S: Simd>(&self, simd: S, which: usize, nodes: [u32; 4]) -> f32x4<S> {
+        let of = |id: u32| self.cells[which].get(id as usize).map_or(UNCOUNTED, |&count| f32::from(count));
+        f32x4::load_array(simd, nodes.map(of))
     }
 
-    /// The lanes of pairs whose boxes overlap, and the shares of the volumes of both that the
-    /// intersection takes up.
+    /// The lanes of pairs whose boxes overlap, and the cube roots of the shares of the volumes of both
+    /// that the intersection takes up.
     #[inline(always)]
     fn overlaps<S: Simd>(
         &self,
         simd: S,
         a: &NodeBounds<f32x4<S>>,
         b: &NodeBounds<f32x4<S>>,
-    ) -> (u32, [[f32; LANES]; 2]) {
+    ) -> (u32, [f32x16<S>; 2]) {
         let relative = self.relative;
         let a = a.map(
             #[inline(always)]
@@ -119,7 +124,7 @@ impl Odds<'_> {
         let common = (share_a * volume_a).min(share_b * volume_b);
         let (share_a, share_b) = ((common / (volume_a + tiny)), (common / (volume_b + tiny)));
         let near = gap.simd_le(relative.slack());
-        (bits(near), [share_a.to_array(), share_b.to_array()])
+        (bits(near), [cube_root(share_a), cube_root(share_b)])
     }
 }
 
@@ -154,19 +159,36 @@ impl<V: OddsVisitor> Comparison<V> for Odds<'_> {
         for j in Bits(b.lanes) {
             lanes |= a.lanes << (4 * j);
         }
-        let (near, shares) = self.overlaps(simd, &a.bounds, &b.bounds);
-        let mut most = MostUrgent::new();
-        for lane in Bits(near & lanes) {
-            let (i, j) = (a.nodes[lane % 4], b.nodes[lane / 4]);
-            let filled = [
-                self.filled(0, i) * shares[0][lane % LANES].cbrt(),
-                self.filled(1, j) * shares[1][lane % LANES].cbrt(),
-            ];
-            let pair = NodePair { a: NodeId(i), b: NodeId(j) };
-            visitor.overlapping(pair, filled);
-            let key = -expected(filled);
-            most.add(Open { pair, key }, frontier);
+        let (near, [of_a, of_b]) = self.overlaps(simd, &a.bounds, &b.bounds);
+        let compared = lanes.count_ones();
+        let near = mask32x16::from_bitmask(simd, u64::from(near & lanes));
+        let filled_a = repeated(self.filled(simd, 0, a.nodes)) * of_a;
+        let filled_b = spread(self.filled(simd, 1, b.nodes)) * of_b;
+        let keys = near.select(-expected([filled_a, filled_b]), f32x16::splat(simd, f32::INFINITY));
+        let likely = bits(keys.simd_le(-visitor.least_expected()));
+        if likely != 0 {
+            let (filled_a, filled_b) = (filled_a.to_array(), filled_b.to_array());
+            for lane in Bits(likely) {
+                visitor.likely([filled_a[lane % LANES], filled_b[lane % LANES]]);
+            }
         }
-        (lanes.count_ones(), most.finish(simd, frontier))
+        let mut lanes = bits(near);
+        if lanes == 0 {
+            frontier.settle(simd);
+            return (compared, None);
+        }
+        let most = bits(keys.simd_eq(keys.reduce_min())) & lanes;
+        // Without a finite number, any lane serves.
+        let most = if most == 0 { lanes } else { most }.trailing_zeros() as usize;
+        let keys = keys.to_array();
+        let open = |lane: usize| {
+            let pair = NodePair { a: NodeId(a.nodes[lane % 4]), b: NodeId(b.nodes[lane / 4 % 4]) };
+            Open { pair, key: keys[lane % LANES] }
+        };
+        lanes &= !(1 << most);
+        for lane in Bits(lanes) {
+            frontier.push(open(lane));
+        }
+        (compared, frontier.push_last(open(most)))
     }
 }

@@ -131,9 +131,11 @@ impl<'a> MeshPair<'a> {
         if scratch.table.as_ref().is_none_or(|table| table.shared() != quality.shared) {
             scratch.table = Some(CellTable::new(quality.shared.clamp(1, MOST_SHARED)));
         }
-        let MeshScratch { level, heap, left, table, .. } = scratch;
+        let MeshScratch { level, heap, stack, left, table, .. } = scratch;
         let Some(table) = table else { return INVALID };
-        self.ask(*level, |pair| time_critical::collide(pair, quality, table, (heap, left))).unwrap_or(INVALID)
+        let (may_end, memory) = (self.budget.may_end(), (heap, stack, left));
+        let ask = |pair: &mut MeshPairing<'_>| time_critical::collide(pair, quality, table, may_end, memory);
+        self.ask(*level, ask).unwrap_or(INVALID)
     }
 
     /// Like [`Self::collide`], but starts from `hint`, and updates it. Takes no search if the triangles
@@ -189,9 +191,12 @@ impl<'a> MeshPair<'a> {
     }
 
     /// Calls `ask` with the pair under its relative pose; `None` if a pose is invalid.
-    fn ask<R>(&self, level: Level, ask: impl FnOnce(MeshPairing<'_>) -> R) -> Option<R> {
-        let views = self.meshes.map(|placed| placed.mesh().arrays());
-        MeshPairing::new(self.meshes, views.each_ref(), &self.budget, level).map(ask)
+    #[inline]
+    fn ask<R>(&self, level: Level, ask: impl FnOnce(&mut MeshPairing<'_>) -> R) -> Option<R> {
+        // An array by `map` would be copied.
+        let views = [self.meshes[0].mesh().arrays(), self.meshes[1].mesh().arrays()];
+        let mut pair = MeshPairing::new(&self.meshes, views.each_ref(), &self.budget, level)?;
+        Some(ask(&mut pair))
     }
 }
 

@@ -6,21 +6,15 @@ use nearmiss_lanes::vector::{dot, sub};
 use crate::mesh::answer::ContactRegion;
 use crate::mesh::mesh_pair::MeshPairing;
 
-/// The part of `own` that is within the extents of `other` along the axes of `own`.
-fn cut(own: &OrientedBox, other: &OrientedBox) -> OrientedBox {
+/// The interval along each axis of `own` that `own` and `other` have in common, relative to the centre
+/// of `own`. `cosines` has the magnitudes of the products of own axes with the others.
+fn common(own: &OrientedBox, other: &OrientedBox, cosines: &[[f32; 3]; 3]) -> [[f32; 2]; 3] {
     let d = sub(other.centre, own.centre);
-    let mut part = *own;
-    for k in 0..3 {
-        let axis = own.axes[k];
-        let middle = dot(axis, d);
-        let reach: f32 = (0..3).map(|j| other.half[j] * dot(axis, other.axes[j]).abs()).sum();
-        let (low, high) = ((-own.half[k]).max(middle - reach), own.half[k].min(middle + reach));
-        part.half[k] = 0.5 * (high - low).max(0.0);
-        for j in 0..3 {
-            part.centre[j] += 0.5 * (low + high) * axis[j];
-        }
-    }
-    part
+    [0, 1, 2].map(|k| {
+        let (middle, reach) = (dot(own.axes[k], d), dot(other.half, cosines[k]));
+        let low = (-own.half[k]).max(middle - reach);
+        [low, own.half[k].min(middle + reach).max(low)]
+    })
 }
 
 /// The intersection of the boxes of two nodes: the smaller of the parts that the boxes cut out of
@@ -28,12 +22,24 @@ fn cut(own: &OrientedBox, other: &OrientedBox) -> OrientedBox {
 pub(crate) fn region(pair: &MeshPairing<'_>, nodes: NodePair) -> ContactRegion {
     let a = pair.a.tree.bounds(nodes.a);
     let b = pair.relative.moved(&pair.b.tree.bounds(nodes.b));
-    let parts = [cut(&a, &b), cut(&b, &a)];
-    let [p, q] = parts.map(|part| part.radius());
-    let part = if p <= q { parts[0] } else { parts[1] };
+    let cosines = a.axes.map(|u| b.axes.map(|v| dot(u, v).abs()));
+    let transposed = [0, 1, 2].map(|k| [0, 1, 2].map(|j| cosines[j][k]));
+    let parts = [(&a, common(&a, &b, &cosines)), (&b, common(&b, &a, &transposed))];
+    let radius = |part: &[[f32; 2]; 3]| {
+        let half = part.map(|[low, high]| 0.5 * (high - low));
+        dot(half, half).sqrt()
+    };
+    let [p, q] = parts.each_ref().map(|(_, part)| radius(part));
+    let (own, part) = if p <= q { &parts[0] } else { &parts[1] };
+    let mut centre = own.centre;
+    for (axis, [low, high]) in own.axes.iter().zip(part) {
+        for j in 0..3 {
+            centre[j] += 0.5 * (low + high) * axis[j];
+        }
+    }
     let placed = pair.meshes[0].stored_to_world();
     ContactRegion {
-        centre: placed.apply(part.centre.map(f64::from)),
-        radius: f64::from(part.radius()) * placed.scale(),
+        centre: placed.apply(centre.map(f64::from)),
+        radius: f64::from(p.min(q)) * placed.scale(),
     }
 }

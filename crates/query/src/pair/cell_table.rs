@@ -10,6 +10,8 @@
 //! Smooth sheets that are near and parallel are not placed independently. The probability therefore
 //! orders pairs of nodes and never prunes one.
 
+use std::ops::Mul;
+
 /// The number of cells s.
 const CELLS: usize = nearmiss_hierarchy::CELLS as usize;
 
@@ -21,8 +23,8 @@ pub(crate) const MOST_SHARED: u32 = 16;
 
 /// The mean of c for two counts of filled cells. It orders pairs as the probability does, and does
 /// not saturate.
-#[inline]
-pub(crate) fn expected([a, b]: [f32; 2]) -> f32 {
+#[inline(always)]
+pub(crate) fn expected<V: Mul<Output = V> + Mul<f32, Output = V>>([a, b]: [V; 2]) -> V {
     a * b * (1.0 / CELLS as f32)
 }
 
@@ -65,6 +67,14 @@ impl CellTable {
         self.shared
     }
 
+    /// A lower bound of the mean of c where `Pr[c < x]` is at most `threshold`, by Markov's inequality:
+    /// `Pr[c ≥ x]` is at most the mean of c divided by x.
+    #[inline]
+    pub(crate) fn least_expected(&self, threshold: f32) -> f32 {
+        // Less the rounding of the table.
+        (1.0 - threshold - 1e-6) * self.shared as f32
+    }
+
     /// `Pr[c < x]` for two counts of 0 to s, interpolated between whole counts.
     #[inline]
     pub(crate) fn fewer(&self, filled: [f32; 2]) -> f32 {
@@ -90,6 +100,7 @@ impl CellTable {
 #[cfg(test)]
 mod tests {
     use nearmiss_testdata::arbitrary::rng;
+    use rand::RngExt;
     use rand::seq::SliceRandom;
 
     use super::*;
@@ -117,6 +128,22 @@ mod tests {
             let found = 1.0 - CellTable::new(shared).fewer([20.0, 15.0]);
             assert!((found - expected).abs() < 1e-4, "{shared}: {found}");
         }
+    }
+
+    #[test]
+    fn pairs_that_count_have_the_least_mean() {
+        let rng = &mut rng(2212);
+        let mut closest = f32::INFINITY;
+        for shared in [1, 4, MOST_SHARED] {
+            let table = CellTable::new(shared);
+            for _ in 0..200_000 {
+                let filled = [(); 2].map(|()| rng.random_range(0.0..64.0_f32));
+                let (mean, least) = (expected(filled), table.least_expected(table.fewer(filled)));
+                assert!(mean >= least, "{filled:?}, {shared}: {mean}, {least}");
+                closest = closest.min(mean - least);
+            }
+        }
+        assert!(closest < 0.1, "{closest}");
     }
 
     #[test]

@@ -82,7 +82,7 @@ impl ContactSurvey {
 
 /// A search for all contacts.
 struct Gathering<'c, 'a> {
-    pair: MeshPairing<'a>,
+    pair: &'c mut MeshPairing<'a>,
     survey: &'c mut ContactSurvey,
 }
 
@@ -108,19 +108,13 @@ impl PairVisitor for Gathering<'_, '_> {
 impl BoxVisitor for Gathering<'_, '_> {}
 
 impl ContactSurvey {
-    /// Finds all contacts of a pair, as far as its budget lasts. Returns the pair, and breaks if the
-    /// budget ended the search.
-    pub(crate) fn find<'a>(
-        &mut self,
-        pair: MeshPairing<'a>,
-        stack: &mut Stack,
-    ) -> (MeshPairing<'a>, ControlFlow<()>) {
+    /// Finds all contacts of a pair, as far as its budget lasts. Breaks if the budget ended the search.
+    pub(crate) fn find(&mut self, pair: &mut MeshPairing<'_>, stack: &mut Stack) -> ControlFlow<()> {
         self.clear();
         stack.clear();
         let (relative, level) = (pair.relative, pair.level);
         let mut search = Gathering { pair, survey: self };
         let trees = search.pair.trees(&relative);
-        let flow = descend(trees, level, stack, &mut search);
-        (search.pair, flow)
+        descend(trees, level, stack, &mut search)
     }
 }

@@ -48,12 +48,18 @@ impl<'s> Probe<'s> {
         pose.with_translation((Vector::from(pose.translation()) + t).into())
     }
 
-    /// Returns the pair with b shifted by `t`; `None` if a pose is invalid.
-    pub(crate) fn shifted(&self, t: Vector) -> Option<MeshPairing<'s>> {
+    /// Returns the meshes with b shifted by `t`.
+    fn shifted(&self, t: Vector) -> [PlacedMesh<'s>; 2] {
         let [a, b] = self.meshes;
-        let [va, vb] = self.views;
-        let moved = PlacedMesh::new(b.mesh(), &self.pose_of_b(t));
-        MeshPairing::new([a, moved], [va, vb], &self.budget(), self.level)
+        [a, PlacedMesh::new(b.mesh(), &self.pose_of_b(t))]
+    }
+
+    /// Returns the pair of shifted meshes; `None` if a pose is invalid.
+    fn pair<'m>(&self, meshes: &'m [PlacedMesh<'m>; 2]) -> Option<MeshPairing<'m>>
+    where
+        's: 'm,
+    {
+        MeshPairing::new(meshes, self.views.each_ref(), &self.budget(), self.level)
     }
 
     /// Returns what is left of the budget. The limit against damaged files is that of each test.
@@ -82,7 +88,7 @@ impl<'s> Probe<'s> {
         let mut length = (r + s - way.dot(&between)).max(0.0) * (1.0 + 1e-5) + 1e-9 * (r + s);
         // Rounding grows with the distance from the origin.
         for _ in 0..64 {
-            if self.shifted(way * length)?.gap > 0.0 {
+            if self.pair(&self.shifted(way * length))?.gap > 0.0 {
                 return Some(way * length);
             }
             length *= 2.0;
@@ -94,8 +100,9 @@ impl<'s> Probe<'s> {
     /// triangles there are separated soonest; `None` if the surfaces do not meet. Breaks if the
     /// budget ended the search.
     pub(crate) fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
-        let Some(pair) = self.shifted(t) else { return ControlFlow::Break(()) };
-        let (pair, flow, met) = first_met(pair, self.stack);
+        let meshes = self.shifted(t);
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
+        let (flow, met) = first_met(&mut pair, self.stack);
         self.spend(&pair.meter.spent);
         let Some(met) = met else { return flow.map_continue(|()| None) };
         let [a, b] = pair.corners(met);
@@ -110,9 +117,10 @@ impl<'s> Probe<'s> {
     ///
     /// If no triangles meet, each part of a mesh is inside or outside of the other solid as a whole.
     pub(crate) fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
-        let Some(pair) = self.shifted(t) else { return ControlFlow::Break(()) };
+        let meshes = self.shifted(t);
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         let are_balls_apart = pair.gap > 0.0;
-        let (pair, flow, met) = first_met(pair, self.stack);
+        let (flow, met) = first_met(&mut pair, self.stack);
         self.spend(&pair.meter.spent);
         if met.is_some() {
             return ControlFlow::Continue(false);
@@ -144,7 +152,8 @@ impl<'s> Probe<'s> {
     /// inside both solids. Breaks if the budget is spent.
     pub(crate) fn feet(&mut self, place: Vector) -> ControlFlow<(), Option<[Vector; 2]>> {
         let (Some(a), Some(b)) = (self.solid(0), self.solid(1)) else { return ControlFlow::Continue(None) };
-        let Some(mut pair) = self.shifted(Vector::zeros()) else { return ControlFlow::Break(()) };
+        let meshes = self.meshes;
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         pair.meter.go_on()?;
         self.spent.evaluations += 1;
         let mut feet = [Vector::zeros(); 2];
@@ -190,8 +199,9 @@ impl<'s> Probe<'s> {
 
     /// Finds all contacts without a shift. Breaks if the budget ended the search.
     pub(crate) fn contacts(&mut self, contacts: &mut ContactSurvey) -> ControlFlow<()> {
-        let Some(pair) = self.shifted(Vector::zeros()) else { return ControlFlow::Break(()) };
-        let (pair, flow) = contacts.find(pair, self.stack);
+        let meshes = self.meshes;
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
+        let flow = contacts.find(&mut pair, self.stack);
         self.spend(&pair.meter.spent);
         flow
     }
