@@ -15,7 +15,7 @@ use crate::mesh::extents::boxes_of_triangles;
 use crate::mesh::moments::axes_of_nodes;
 use crate::mesh::options::{MeshBuildError, MeshBuildOptions};
 use crate::scan::outline::Ball;
-use crate::tree::split::{Item, Size, split};
+use crate::tree::split::{Bounds, Item, Parts, split};
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Root, Siblings, Tree, siblings};
 
@@ -236,9 +236,10 @@ fn over(
         let position = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
         Item { position, index: id32(i) }
     });
+    let bounds_of: Vec<Bounds> = map(triangles.len(), |i| Bounds::of(&corners_of(i)));
     let mut boxes = vec![OrientedBox::default(); topology.len()];
     let count = items.len();
-    split(&mut items, &topology, count, Size::Diagonal, &mut boxes);
+    split(&mut items, &topology, count, Parts::Triangles(&bounds_of), &mut boxes);
 
     let mut blocks = vec![TriangleBlock::zeroed(); topology.leaves()];
     fill(&mut blocks, |number| block(&topology, number, |i| corners_of(items[i].index as usize)));

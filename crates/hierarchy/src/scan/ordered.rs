@@ -18,7 +18,7 @@ use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::points::ScanPoints;
 use crate::scan::sampling::{Sampling, set_reaches};
 use crate::scan::share;
-use crate::tree::split::{Item, Size, bound_in_order, split};
+use crate::tree::split::{Item, Parts, bound_in_order, split};
 use crate::tree::topology::Topology;
 use crate::tree::wide::Bare;
 
@@ -101,7 +101,7 @@ impl Ordered {
         // would.
         fill(&mut items, |i| Item { position: points.positions[i], index: points.source[i] });
         let mut boxes = work.room(topology.len())?;
-        split(&mut items, &topology, count, Size::Volume, &mut boxes);
+        split(&mut items, &topology, count, Parts::Points, &mut boxes);
         let mut positions = work.room(count)?;
         let mut source = work.room(count)?;
         {
@@ -117,7 +117,7 @@ impl Ordered {
         let known = (|i: usize| positions[i], |i: usize| fits[i].kind());
         if let Some((mut items, before)) = dense_first(count, known, options.leaf_size as usize, work)? {
             summary.dense = before;
-            split(&mut items, &topology, before, Size::Volume, boxes);
+            split(&mut items, &topology, before, Parts::Points, boxes);
             let items: &[Item] = &items;
             fill(positions, |i| items[i].position);
             *source = reordered(items, source, work)?;

@@ -1,7 +1,8 @@
 //! The sixteen pairs of triangles of two leaves, in lanes.
 //!
-//! A filter in single precision: it rejects a pair only if all corners of one triangle are on one
-//! side of the other's plane, rounding included. The exact test decides about the other pairs.
+//! A filter in single precision: it rejects a pair only if the triangles' bounding boxes along the axes
+//! of a's frame are disjoint, or all corners of one triangle are on one side of the other's plane,
+//! rounding included. The exact test decides about the other pairs.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
@@ -23,7 +24,7 @@ pub(crate) fn may_meet(level: Level, [a, b]: [&TriangleBlock; 2], relative: &Rel
 fn may_meet_by<S: Simd>(simd: S, blocks: [&TriangleBlock; 2], relative: &Relative) -> u32 {
     let [a, b] = in_lanes(simd, blocks, relative);
     let slack = relative.slack();
-    let apart = is_beside(&a, &b, slack) | is_beside(&b, &a, slack);
+    let apart = are_boxes_apart(&a, &b, slack) | is_beside(&a, &b, slack) | is_beside(&b, &a, slack);
     !bits(apart) & 0xffff
 }
 
@@ -47,6 +48,18 @@ fn each_repeated<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vector<S> {
 #[inline(always)]
 fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vector<S> {
     [spread(x), spread(y), spread(z)]
+}
+
+/// Returns the lanes in which the bounding boxes of the triangles are disjoint. Each coordinate is off
+/// by at most the slack.
+#[inline(always)]
+fn are_boxes_apart<S: Simd>(a: &[Vector<S>; 3], b: &[Vector<S>; 3], slack: f32) -> mask32x16<S> {
+    let gap = |k: usize| {
+        let low = |t: &[Vector<S>; 3]| t[0][k].min(t[1][k]).min(t[2][k]);
+        let high = |t: &[Vector<S>; 3]| t[0][k].max(t[1][k]).max(t[2][k]);
+        (low(b) - high(a)).max(low(a) - high(b))
+    };
+    gap(0).max(gap(1)).max(gap(2)).simd_gt(2.5 * slack)
 }
 
 /// Returns the lanes in which all corners of `other` are on one side of the plane of `own`.
