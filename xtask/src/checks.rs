@@ -67,8 +67,10 @@ fn beside(name: &str) -> Outcome<Command> {
 
 /// Verifies answers, counts and shapes with known answers; then the proofs of a scan near itself.
 fn verify() -> Outcome {
-    // Together, since they then share the libraries; without rivals that take long to compile.
-    let packages = ["-p", "nearmiss-benches", "-p", "check-proof", "--no-default-features"];
+    // Together with the command line, since they then have the features of this program and share its
+    // libraries; without rivals that take long to compile.
+    let packages =
+        ["-p", "nearmiss-benches", "-p", "check-proof", "-p", "nearmiss-cli", "--no-default-features"];
     let programs = ["--bin", "verify", "--bin", "check-proof"];
     run_cargo(&[&["build", "--release", "--quiet"][..], &packages, &programs].concat())?;
     run(beside("verify")?.arg("--quick"), "verify")?;

@@ -307,8 +307,14 @@ pub(crate) fn c_library(words: &[&str]) -> Outcome {
     }
     fs::copy(source.join("include/nearmiss.h"), include.join("nearmiss.h"))?;
     fs::copy(source.join("cmake/nearmiss-config.cmake"), cmake.join("nearmiss-config.cmake"))?;
-    let described = fs::read_to_string(source.join("nearmiss.pc.in"))?;
-    fs::write(pkgconfig.join("nearmiss.pc"), described.replace("@VERSION@", env!("CARGO_PKG_VERSION")))?;
+    let versioned = [
+        ("nearmiss.pc.in", pkgconfig.join("nearmiss.pc")),
+        ("cmake/nearmiss-config-version.cmake.in", cmake.join("nearmiss-config-version.cmake")),
+    ];
+    for (template, path) in versioned {
+        let text = fs::read_to_string(source.join(template))?;
+        fs::write(path, text.replace("@VERSION@", env!("CARGO_PKG_VERSION")))?;
+    }
     let archive = if cfg!(windows) { "nearmiss_c.lib" } else { "libnearmiss_c.a" };
     for file in [shared("nearmiss_c"), archive.to_owned()] {
         fs::copy(release.join(&file), lib.join(&file))?;

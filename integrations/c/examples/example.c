@@ -48,7 +48,7 @@ int main(int argc, char **argv) {
         NearmissAnswer answer;
         TRY(nearmiss_manifold(plan, &still, &moving, &budget, hint, scratch, &list, &answer));
         if (answer.verdict == NEARMISS_VERDICT_TOUCHING) {
-            printf("frame %d: touching, %zu contact points\n", frame, list.count);
+            printf("frame %d: touching, contact points: %zu\n", frame, list.count);
             for (size_t i = 0; i < list.count; i++) {
                 const double *at = points[i].point;
                 printf("  at (%.4f, %.4f, %.4f), gap %.4f\n", at[0], at[1], at[2], points[i].gap);

@@ -60,4 +60,9 @@ mod _native {
     use super::things::{AnyScan, Mesh};
     #[pymodule_export]
     use super::world::World;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

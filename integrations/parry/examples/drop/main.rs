@@ -50,6 +50,12 @@ fn run() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1);
     let quads = house();
     let path = words.next().filter(|path| path != "-");
+    // Created first, so that a wrong path is reported before the bodies fall.
+    let create = |path: String| match File::create(&path) {
+        Ok(file) => Ok((path, file)),
+        Err(error) => Err(format!("{path}: {error}")),
+    };
+    let drawn = words.next().map(create).transpose()?;
     let scan = match &path {
         Some(path) => common::open(path)?.0,
         None => {
@@ -67,9 +73,9 @@ fn run() -> Result<(), Failure> {
         let (_, energy) = fall(&scan, SharedShape::new(exact), &places);
         records.push(energy::Record { name: "on the mesh", steps: energy });
     }
-    if let Some(path) = words.next() {
+    if let Some((path, file)) = drawn {
         let picture = picture::strip(&scan, &strip);
-        picture.encode(BufWriter::new(File::create(&path)?))?;
+        picture.encode(BufWriter::new(file))?;
         energy::plot(&records, &Path::new(&path).with_extension("svg"))?;
     }
     Ok(())
