@@ -91,8 +91,8 @@ fn most_probable(open: &mut [Open]) -> (&[Open], NodePair) {
 /// The likelihood that open pairs contain a contact. The keys of the most probable ones are the
 /// negated numbers of cells that both surfaces are expected to fill; the sum Λ of the numbers decides.
 ///
-/// A logistic function of ln Λ, fitted to five objects against themselves with equal weight, at 16
-/// to 256 node pairs (docs/theory/meshes.md).
+/// A logistic function of ln Λ, fitted to five objects against themselves with equal weight, at 1 to
+/// 256 node pairs (docs/theory/meshes.md).
 fn likelihood(most: &[Open]) -> f64 {
     let sum: f64 = most.iter().map(|open| -f64::from(open.key)).sum();
     let logit = LIKELIHOOD[0] + LIKELIHOOD[1] * sum.max(1e-9).ln();
@@ -100,7 +100,7 @@ fn likelihood(most: &[Open]) -> f64 {
 }
 
 /// The constant and the factor of ln Λ.
-const LIKELIHOOD: [f64; 2] = [-9.68, 2.86];
+const LIKELIHOOD: [f64; 2] = [-6.91, 2.12];
 
 /// Decides whether two meshes meet, as well as `quality` and the budget ask for.
 pub(crate) fn collide(
