@@ -40,7 +40,7 @@ const WORTH_A_TRY: f32 = 0.5;
 /// The number of points from which the candidates are judged.
 const JUDGED_BY: usize = 512;
 
-/// What the items stand for, and thereby the sizes of children that a split keeps small.
+/// The things that the items stand for. They decide which size of children a split keeps small.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Parts<'a> {
     /// Points of a surface. The size is the volume of the box along the principal axes. A patch of
