@@ -168,9 +168,8 @@ fn agree(built: &Path, work: &Path) -> Outcome {
         let line: serde_json::Value = serde_json::from_str(line)?;
         let [a, b] = ["a", "b"].map(|side| matrix(&line[side]));
         let relative = nearmiss::Pose::from_matrix(&a?)?.inverse().after(&nearmiss::Pose::from_matrix(&b?)?);
-        let turn = nearmiss::geometry::nalgebra::Rotation3::from_matrix_unchecked(*relative.rotation());
-        let [i, j, k, w]: [f64; 4] =
-            nearmiss::geometry::nalgebra::UnitQuaternion::from_rotation_matrix(&turn).coords.into();
+        let turn = nalgebra::Rotation3::from_matrix_unchecked(*relative.rotation());
+        let [i, j, k, w]: [f64; 4] = nalgebra::UnitQuaternion::from_rotation_matrix(&turn).coords.into();
         let [x, y, z] = relative.translation();
         poses += &format!("{x} {y} {z} {i} {j} {k} {w}\n");
     }

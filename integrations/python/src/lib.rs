@@ -36,6 +36,9 @@ mod world;
 
 #[pyo3::pymodule]
 mod _native {
+    use pyo3::types::{PyModule, PyModuleMethods};
+    use pyo3::{Bound, PyResult};
+
     #[pymodule_export]
     use super::answers::{Answer, Distance};
     #[pymodule_export]
