@@ -3,12 +3,14 @@
 use std::ops::Deref;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use nearmiss::store::Progress;
 use nearmiss::{DeformError, MovingScan, Placed, PointHierarchy, Pose, Prepared, Scan};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 
 use crate::failure::refused;
 use crate::pool::in_pool;
+use crate::prepare::watched;
 
 /// A moving scan that threads share.
 ///
@@ -43,16 +45,28 @@ impl Moving {
         py: Python<'_>,
         work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError> + Send,
     ) -> PyResult<&'static str> {
-        let changed = py.detach(|| {
-            let mut latest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            let scan = Arc::make_mut(&mut latest.scan);
-            let changed = in_pool(|| work(scan));
-            if let Ok(Ok(renewal)) = changed {
-                latest.renewal = Some(renewal);
-            }
-            changed
-        });
-        changed?.map_err(refused)
+        py.detach(|| in_pool(|| self.change_here(work)))?.map_err(refused)
+    }
+
+    /// Does the same in a thread of its own. Ctrl-C ends the wait; the change is then completed in the
+    /// background.
+    pub(crate) fn change_watched(
+        self: &Arc<Self>,
+        py: Python<'_>,
+        work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError> + Send + 'static,
+    ) -> PyResult<&'static str> {
+        let moving = Arc::clone(self);
+        watched(py, None, &Progress::default(), move || moving.change_here(work))?.map_err(refused)
+    }
+
+    fn change_here(
+        &self,
+        work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError>,
+    ) -> Result<&'static str, DeformError> {
+        let mut latest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let renewal = work(Arc::make_mut(&mut latest.scan))?;
+        latest.renewal = Some(renewal);
+        Ok(renewal)
     }
 }
 

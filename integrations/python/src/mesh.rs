@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use nearmiss::geometry::TriangleMesh;
 use nearmiss::mesh::CleanOptions;
+use nearmiss::store::Progress;
 use nearmiss::{Mesh as Prepared, MeshBuildOptions, MeshSolid, Metric};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
@@ -15,8 +16,9 @@ use crate::cloud::rows;
 use crate::failure::{refused, unloadable, unreadable, unwritable};
 use crate::options::{OF_BUDGET, Options};
 use crate::pair::{Apart, Contact, Question, mesh_pair_of};
-use crate::pool::{ask, in_pool};
+use crate::pool::ask;
 use crate::poses::both;
+use crate::prepare::watched;
 use crate::record::array;
 use crate::scan::check_of;
 use crate::things::{Mesh, Side, Thing};
@@ -26,9 +28,9 @@ impl Mesh {
         Self { mesh, solid: OnceLock::new() }
     }
 
-    fn build(py: Python<'_>, mesh: &TriangleMesh, weld: f64) -> PyResult<Self> {
+    fn build(py: Python<'_>, mesh: TriangleMesh, weld: f64) -> PyResult<Self> {
         let options = MeshBuildOptions::default().with_clean(CleanOptions::default().with_weld(weld));
-        let built = py.detach(|| in_pool(|| Prepared::build(mesh, &options)))?;
+        let built = watched(py, None, &Progress::default(), move || Prepared::build(&mesh, &options))?;
         built.map(Self::new_of).map_err(refused)
     }
 
@@ -53,7 +55,7 @@ impl Mesh {
     fn new(vertices: &Bound<'_, PyAny>, triangles: &Bound<'_, PyAny>, weld: f64) -> PyResult<Self> {
         let mesh =
             TriangleMesh::new(Points::new(vertices)?.to_doubles()?, corners(triangles)?).map_err(refused)?;
-        Self::build(vertices.py(), &mesh, weld)
+        Self::build(vertices.py(), mesh, weld)
     }
 
     /// Prepare the triangles of a file: OBJ, PLY with faces, STL, OFF or glTF.
@@ -64,7 +66,7 @@ impl Mesh {
     fn read(py: Python<'_>, path: PathBuf, format: Option<&str>, weld: f64) -> PyResult<Self> {
         let format = format.map(str::parse).transpose().map_err(refused)?;
         let mesh = py.detach(|| nearmiss::io::read_mesh(&path, format)).map_err(unreadable)?;
-        Self::build(py, &mesh, weld)
+        Self::build(py, mesh, weld)
     }
 
     /// Open a prepared file (`.nm`) by mapping it. `check` is that of `Scan.open`.

@@ -97,11 +97,11 @@ impl MovingScan {
     /// Replace the scan by one of other points, of shape (M, 3), such as the next frame of a depth camera.
     ///
     /// Points that are not finite are dropped. `move_to` then takes points in the order of this frame. If it
-    /// raises `ValueError`, the scan is unchanged.
+    /// raises `ValueError`, the scan is unchanged. Ctrl-C ends the wait; the scan is then replaced in the
+    /// background, and questions wait for it.
     fn replace(&self, points: &Bound<'_, PyAny>) -> PyResult<()> {
-        let (py, points) = (points.py(), Points::new(points)?);
-        let points = points.doubles()?;
-        self.0.change(py, |scan| scan.replace(&points).map(|()| REPLACED)).map(drop)
+        let (py, points) = (points.py(), Points::new(points)?.to_doubles()?);
+        self.0.change_watched(py, move |scan| scan.replace(&points).map(|()| REPLACED)).map(drop)
     }
 
     /// Replace the scan by a depth frame: an array of shape (H, W, 3), with a point for each pixel.

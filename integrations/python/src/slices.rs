@@ -7,13 +7,15 @@ use nearmiss::slices::{
     Avatar, AvatarOptions, Floor, Obstacle, Pixel, Route, SliceBuilder, SliceError, SliceFolder,
     SliceMap as Map, SliceOptions, SlicePlan, Slide, StoreError,
 };
+use nearmiss::store::Progress;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use crate::arrays::{Points, doubles, vector, wrong_shape};
 use crate::cloud::rows;
 use crate::failure::{refused, unstored};
-use crate::pool::{ask_each, in_pool};
+use crate::pool::ask_each;
+use crate::prepare::watched;
 use crate::record::{array, record};
 
 record! {
@@ -73,7 +75,7 @@ impl SliceMap {
             builder.add(&points);
             Ok(builder.finish())
         };
-        let made = py.detach(|| in_pool(made));
+        let made = watched(py, None, &Progress::default(), made);
         made?.map(Self).map_err(|cause: SliceError| refused(cause))
     }
 

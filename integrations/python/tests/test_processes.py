@@ -88,22 +88,46 @@ class Concurrency(unittest.TestCase):
             thread.join()
         self.assertEqual(wrong, [])
 
-    def test_an_interrupt_ends_a_batch(self):
-        scan = dragon()
-        # Half a minute of work or more.
-        many = np.repeat(poses(3, 1000, 0.1), 500, axis=0)
-        timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+    def interrupted(self, work):
+        """Interrupt `work` soon after its start and return the time that it took."""
+        timer = threading.Timer(0.1, signal.raise_signal, [signal.SIGINT])
         before = signal.signal(signal.SIGINT, signal.default_int_handler)
         start = time.monotonic()
         try:
             timer.start()
             with self.assertRaises(KeyboardInterrupt):
-                scan.distance_each(scan, many)
+                work()
         finally:
             timer.join()
             signal.signal(signal.SIGINT, before)
-        self.assertLess(time.monotonic() - start, 5.0)
+        return time.monotonic() - start
+
+    def test_an_interrupt_ends_a_batch(self):
+        scan = dragon()
+        # Half a minute of work or more.
+        many = np.repeat(poses(3, 1000, 0.1), 500, axis=0)
+        self.assertLess(self.interrupted(lambda: scan.distance_each(scan, many)), 5.0)
         self.assertEqual(len(scan.distance_each(scan, many[:10])), 10)
+
+    def test_an_interrupt_ends_the_wait_for_a_preparation(self):
+        side = np.linspace(0.0, 1.0, 700)
+        points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+        points = np.column_stack([points, 0.05 * np.sin(9.0 * points[:, 0])])
+        first = (np.arange(699)[:, None] * 700 + np.arange(699)).reshape(-1, 1)
+        triangles = np.concatenate([first + [0, 1, 700], first + [1, 701, 700]])
+        moving = nearmiss.MovingScan(plate())
+        for name, work in [
+            ("mesh", lambda: nearmiss.Mesh(points, triangles)),
+            ("slices", lambda: nearmiss.SliceMap(points, pixel=2e-4, slice_height=1e-2)),
+            ("frame", lambda: moving.replace(points)),
+        ]:
+            with self.subTest(name):
+                start = time.monotonic()
+                work()
+                whole = time.monotonic() - start
+                self.assertGreater(whole, 0.4, "long enough to be interrupted")
+                self.assertLess(self.interrupted(work), 0.7 * whole)
+        self.assertEqual(len(moving), len(points), "waits for the frame")
 
     @unittest.skipUnless(hasattr(os, "fork"), "needs fork")
     def test_forked_processes_answer_and_prepare(self):
