@@ -9,14 +9,14 @@ mod starts;
 use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_lanes::wide::{bits, repeated, spread};
+use nearmiss_lanes::wide::bits;
 
 use crate::bounds::boxes::Relative;
-use crate::bounds::lanes::{Boxes, along_normals};
+use crate::bounds::lanes::along_normals;
 use crate::tree::topology::{FAN, NodePair};
-use crate::tree::wide::{LANES, Lanes, Siblings, Tree, lanes_of, rows, whole};
+use crate::tree::wide::{LANES, Siblings, Tree, lanes_of, whole};
 
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
 pub use grid::NodeGrid;
@@ -351,26 +351,8 @@ impl TreePair<'_> {
     /// operations.
     #[inline(always)]
     fn compare<S: Simd>(&self, simd: S, [a, b]: [&Siblings; 2], there: u32, notes_gaps: bool) -> Near<S> {
-        let boxes_a = Boxes {
-            centre: each_repeated(simd, &a.centre),
-            half: each_repeated(simd, &a.half),
-            axes: [
-                each_repeated(simd, &a.axes[0]),
-                each_repeated(simd, &a.axes[1]),
-                each_repeated(simd, &a.axes[2]),
-            ],
-        };
-        let [hx, hy, hz] = rows(simd, &b.half);
-        let (relative, scale) = (self.relative, self.relative.scale());
-        let boxes_b = Boxes {
-            centre: each_spread(relative.points_of_four(rows(simd, &b.centre))),
-            half: each_spread([hx * scale, hy * scale, hz * scale]),
-            axes: [
-                each_spread(relative.directions_of_four(rows(simd, &b.axes[0]))),
-                each_spread(relative.directions_of_four(rows(simd, &b.axes[1]))),
-                each_spread(relative.directions_of_four(rows(simd, &b.axes[2]))),
-            ],
-        };
+        let boxes_a = a.boxes(simd).repeated();
+        let boxes_b = self.relative.boxes_of_four(&b.boxes(simd)).spread();
         let mut gap = f32x16::splat(simd, f32::MIN);
         let mut share = f32x16::splat(simd, 0.0);
         along_normals(
@@ -434,17 +416,6 @@ const EACH_IN_FOUR: [u32; LANES] = {
     }
     each
 };
-
-#[inline(always)]
-fn each_repeated<S: Simd>(simd: S, of: &[Lanes; 3]) -> [f32x16<S>; 3] {
-    let [x, y, z] = rows(simd, of);
-    [repeated(x), repeated(y), repeated(z)]
-}
-
-#[inline(always)]
-fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> [f32x16<S>; 3] {
-    [spread(x), spread(y), spread(z)]
-}
 
 #[cfg(test)]
 mod tests;

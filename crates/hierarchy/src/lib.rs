@@ -13,6 +13,7 @@ mod tree;
 pub use bounds::boxes::{OrientedBox, Relative, SLACK};
 pub use bounds::cells::CELLS;
 pub use bounds::growth::Growth;
+pub use bounds::lanes::{Boxes, along_normals};
 pub use bounds::part::Part;
 pub use descent::{
     BoxVisitor, Comparison, Frontier, Heap, MostUrgent, NodeGrid, Open, PairVisitor, PlaceVisitor, Plunging,

@@ -44,6 +44,14 @@ pub fn product<S: Simd, V: SimdBase<S>>(a: [V; 3], b: [V; 3]) -> V {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// Returns the cross product of each vector in `a` with the vector in the same lane of `b`, for any
+/// number of lanes.
+#[inline(always)]
+#[must_use]
+pub fn cross<S: Simd, V: SimdBase<S>>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// Returns the squared length of each vector.
 #[inline(always)]
 #[must_use]
@@ -84,6 +92,20 @@ pub fn spread<S: Simd>(four: f32x4<S>) -> f32x16<S> {
     let row = repeated(four);
     let row = row.zip_low(row);
     row.zip_low(row)
+}
+
+/// Repeats four vectors as [`repeated`] does.
+#[inline(always)]
+#[must_use]
+pub fn each_repeated<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vectors<S> {
+    [repeated(x), repeated(y), repeated(z)]
+}
+
+/// Puts each of four vectors into four consecutive lanes as [`spread`] does.
+#[inline(always)]
+#[must_use]
+pub fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vectors<S> {
+    [spread(x), spread(y), spread(z)]
 }
 
 /// Returns the set lanes as bits.

@@ -19,12 +19,12 @@ use serde::{Deserialize, Serialize};
 pub use nearmiss_store::{LoadError, WriteError as SaveError};
 
 /// Version of the layout of a scan's sections and metadata.
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 
 /// The oldest layout version that can be read; the error for an older file names its version.
 /// Whenever a section or a metadata field is added or changes, raise this together with [`VERSION`]
 /// and record a golden file.
-const OLDEST: u32 = 10;
+const OLDEST: u32 = 11;
 
 /// The progress of a fit for the geodesic kernel once all points are fitted.
 const FITTED: f64 = 0.7;

@@ -53,7 +53,7 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
 
     let mut seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
     let version = seen.as_object_mut().unwrap().remove("format_version").unwrap();
-    assert_eq!(version.as_u64(), Some(10));
+    assert_eq!(version.as_u64(), Some(11));
     let mut told = report.clone();
     told.as_object_mut().unwrap().remove("seconds");
     assert_eq!(seen, told, "inspect sees what preprocess told");

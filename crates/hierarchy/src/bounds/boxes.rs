@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_lanes::vector::{cross, dot, sub};
 use serde::{Deserialize, Serialize};
 
 type Axes = [[f32; 3]; 3];
@@ -22,22 +22,22 @@ pub struct OrientedBox {
     pub centre: [f32; 3],
     /// Half the edge lengths.
     pub half: [f32; 3],
-    /// Unit directions of the edges, a right-handed frame.
+    /// Unit directions of the edges. The third one is the product of the first two.
     pub axes: Axes,
     /// Greatest local sampling radius of the points inside.
     pub reach: f32,
 }
 
 /// Bound on the rounding error of an interval of a box, relative to the greatest coordinate along
-/// its axes. In units of 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 7 for
-/// axes that are orthonormal only up to rounding, √3 between coordinates and lengths; below 30 in
-/// all.
-pub(crate) const ROUNDING: f32 = 2e-6;
+/// its axes. In units of 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 20 for
+/// axes that are orthonormal only up to rounding (the third one is a product of rounded vectors), √3
+/// between coordinates and lengths; below 40 in all.
+pub(crate) const ROUNDING: f32 = 3e-6;
 
 /// Bound on the rounding error of a gap between boxes in a relative pose, relative to the sum of
 /// all lengths involved. In units of 2⁻²⁴: 12 for the centre of the transformed box, 4 for the
-/// distance of the centres along an axis, 18 for the half lengths, each less than 8 off in its
-/// cosine; below 40 in all.
+/// distance of the centres along an axis, 30 for the half lengths, each less than 18 off in its
+/// cosine; below 50 in all.
 pub const SLACK: f32 = 4e-6;
 
 impl OrientedBox {
@@ -275,11 +275,11 @@ impl Relative {
     #[must_use]
     pub fn moved(&self, b: &OrientedBox) -> OrientedBox {
         let [hx, hy, hz] = b.half;
-        let [ex, ey, ez] = b.axes;
+        let [u, v, _] = b.axes;
         OrientedBox {
             centre: self.point(b.centre),
             half: [hx * self.scale, hy * self.scale, hz * self.scale],
-            axes: [self.direction(ex), self.direction(ey), self.direction(ez)],
+            axes: frame([self.direction(u), self.direction(v)]),
             reach: b.reach,
         }
     }
@@ -297,8 +297,14 @@ fn greater(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
-/// Returns the normalized vectors in single precision.
+/// Returns the right-handed frame of two orthogonal unit vectors.
+#[inline]
+pub(crate) const fn frame([u, v]: [[f32; 3]; 2]) -> Axes {
+    [u, v, cross(u, v)]
+}
+
+/// Returns the right-handed frame along two orthogonal vectors, in single precision.
 #[expect(clippy::cast_possible_truncation, reason = "box axes are single precision")]
-pub(crate) fn to_axes(vectors: [[f64; 3]; 3]) -> Axes {
-    vectors.map(|v| Vector3::from(v).normalize().map(|x| x as f32).into())
+pub(crate) fn to_axes(vectors: [[f64; 3]; 2]) -> Axes {
+    frame(vectors.map(|v| Vector3::from(v).normalize().map(|x| x as f32).into()))
 }

@@ -1,22 +1,88 @@
 //! Oriented boxes in SIMD lanes.
 
-use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use nearmiss_lanes::wide::product;
+use fearless_simd::{Simd, f32x4, f32x16};
+use nearmiss_lanes::wide::{cross, each_repeated, each_spread, product};
+
+use crate::bounds::boxes::{OrientedBox, Relative};
 
 /// Oriented boxes in lanes: centres, half edge lengths and the directions of the edges.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Boxes<V> {
-    pub(crate) centre: [V; 3],
-    pub(crate) half: [V; 3],
-    pub(crate) axes: [[V; 3]; 3],
+pub struct Boxes<V> {
+    /// The centres.
+    pub centre: [V; 3],
+    /// Half the edge lengths.
+    pub half: [V; 3],
+    /// Unit directions of the edges. The third one is the product of the first two.
+    pub axes: [[V; 3]; 3],
+}
+
+// Functions instead of closures: those may be compiled separately, without the instruction set of
+// their caller.
+
+impl<S: Simd> Boxes<f32x4<S>> {
+    /// Returns the same box in all four lanes.
+    #[inline(always)]
+    #[must_use]
+    pub fn splat(simd: S, of: &OrientedBox) -> Self {
+        let [u, v, w] = of.axes;
+        Self {
+            centre: splat(simd, of.centre),
+            half: splat(simd, of.half),
+            axes: [splat(simd, u), splat(simd, v), splat(simd, w)],
+        }
+    }
+
+    /// Returns each box four times: box i in lanes i, 4 + i, 8 + i and 12 + i.
+    #[inline(always)]
+    #[must_use]
+    pub fn repeated(&self) -> Boxes<f32x16<S>> {
+        let [u, v, w] = self.axes;
+        Boxes {
+            centre: each_repeated(self.centre),
+            half: each_repeated(self.half),
+            axes: [each_repeated(u), each_repeated(v), each_repeated(w)],
+        }
+    }
+
+    /// Returns each box four times: box i in lanes 4i to 4i + 3.
+    #[inline(always)]
+    #[must_use]
+    pub fn spread(&self) -> Boxes<f32x16<S>> {
+        let [u, v, w] = self.axes;
+        Boxes {
+            centre: each_spread(self.centre),
+            half: each_spread(self.half),
+            axes: [each_spread(u), each_spread(v), each_spread(w)],
+        }
+    }
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x4<S>; 3] {
+    [f32x4::splat(simd, x), f32x4::splat(simd, y), f32x4::splat(simd, z)]
+}
+
+impl Relative {
+    /// Transforms four boxes of b's frame to a's. Uses the order of operations of [`Self::moved`].
+    #[inline(always)]
+    #[must_use]
+    pub fn boxes_of_four<S: Simd>(&self, b: &Boxes<f32x4<S>>) -> Boxes<f32x4<S>> {
+        let ([x, y, z], scale) = (b.half, self.scale());
+        let [u, v] = [self.directions_of_four(b.axes[0]), self.directions_of_four(b.axes[1])];
+        Boxes {
+            centre: self.points_of_four(b.centre),
+            half: [x * scale, y * scale, z * scale],
+            axes: [u, v, cross(u, v)],
+        }
+    }
 }
 
 /// Passes the distances of the centres and the sums of the half extents of boxes of a and b to
-/// `tell`, along each of the six face normals. Uses the order of operations of
-/// [`Relative::gap`](crate::Relative::gap).
+/// `tell`, along each of the six face normals: those of a, then those of b. Uses the order of
+/// operations of [`Relative::gap`].
 #[inline(always)]
-pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>, mut tell: impl FnMut(V, V)) {
+pub fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>, mut tell: impl FnMut(V, V)) {
     let d = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];
     let mut reach_b = b.half;
     // Unrolled by hand: a loop would keep all of a in memory.

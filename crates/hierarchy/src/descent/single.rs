@@ -18,10 +18,10 @@ pub trait PlaceVisitor {
     /// Returns the squared distance beyond which boxes are skipped.
     fn most_sq(&self) -> f32;
 
-    /// Returns the same limit for each of four siblings.
+    /// Returns the same limit for each child of `node`.
     #[inline(always)]
-    fn most_sq_of<S: Simd>(&self, simd: S, siblings: &Siblings) -> f32x4<S> {
-        let _ = siblings;
+    fn most_sq_of<S: Simd>(&self, simd: S, node: NodeId) -> f32x4<S> {
+        let _ = node;
         f32x4::splat(simd, self.most_sq())
     }
 
@@ -104,7 +104,7 @@ impl Tree<'_> {
             }
             let (siblings, children) = (&self.siblings[node.index()], topology.children(node));
             let (bottom, distances) = (top, visitor.distances_sq(simd, node, siblings, place));
-            let near: mask32x4<S> = distances.simd_le(visitor.most_sq_of(simd, siblings));
+            let near: mask32x4<S> = distances.simd_le(visitor.most_sq_of(simd, node));
             let near = near.to_bitmask() & u64::from(lanes_of(children));
             if V::IN_ORDER {
                 // First on top.

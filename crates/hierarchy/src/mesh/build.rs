@@ -115,6 +115,7 @@ impl MeshHierarchy {
                 topology: &self.topology,
                 root: &self.meta.root,
                 siblings: &self.arrays.siblings,
+                reaches: &[],
                 growths: [&[]; 2],
             },
             blocks: &self.arrays.blocks,

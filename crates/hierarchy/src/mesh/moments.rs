@@ -56,8 +56,8 @@ impl Moments {
         let about = |k: usize, i: usize, j: usize| self.second[k] / self.area - mean[i] * mean[j];
         let covariance =
             [about(0, 0, 0), about(1, 0, 1), about(2, 0, 2), about(3, 1, 1), about(4, 1, 2), about(5, 2, 2)];
-        let [short, middle, long] = symmetric_eigen(covariance).vectors;
-        Some(to_axes([long, middle, short.map(|c| -c)]))
+        let [_, middle, long] = symmetric_eigen(covariance).vectors;
+        Some(to_axes([long, middle]))
     }
 }
 

@@ -32,7 +32,7 @@ pub(crate) fn refit(
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || for (lane, child) in children.iter().enumerate() {
-                let bounds = about(simd, &blocks[topology.leaves_under(child)], &own.get(lane));
+                let bounds = about(simd, &blocks[topology.leaves_under(child)], &own.get(lane, 0.0));
                 own.set(lane, &bounds);
             },
         ));

@@ -14,7 +14,7 @@ use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_surface::{Centre, Evaluation, Gathered, HalfBlock, Neighbourhood, SurfacePlan};
 
 use crate::descent::PlaceVisitor;
-use crate::tree::wide::{Siblings, Tree};
+use crate::tree::wide::Tree;
 
 /// The number of points in a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
@@ -272,8 +272,8 @@ impl PlaceVisitor for Groups<'_> {
     }
 
     #[inline(always)]
-    fn most_sq_of<S: Simd>(&self, simd: S, siblings: &Siblings) -> f32x4<S> {
-        let [a, b, c, d] = siblings.reach;
+    fn most_sq_of<S: Simd>(&self, simd: S, node: NodeId) -> f32x4<S> {
+        let [a, b, c, d] = *self.tree.reaches_below(node);
         let support_radius = |reach: f32| self.plan.support_radius(reach);
         let support_radii = f32x4::load_array(
             simd,

@@ -68,6 +68,7 @@ pub(crate) fn resize(scan: &mut PointHierarchy, topology: Topology) {
     scan.topology = topology;
     let arrays = &mut scan.arrays;
     sized(&mut arrays.siblings, topology.inner());
+    sized(&mut arrays.reaches, topology.inner());
     sized(&mut arrays.surface_growths, topology.inner());
     sized(&mut arrays.obstacle_growths, topology.inner());
     sized(&mut arrays.leaf_blocks, topology.leaves() * LeafParts::blocks_a_leaf(&topology));

@@ -24,7 +24,7 @@ use crate::scan::outline::{Ball, Outline};
 use crate::scan::points::ScanPoints;
 use crate::scan::prepare::{Prepared, prepare};
 use crate::tree::topology::Topology;
-use crate::tree::wide::{Tree, siblings};
+use crate::tree::wide::{Tree, reaches, siblings};
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree
 /// over them.
@@ -214,6 +214,7 @@ impl PointHierarchy {
     pub(crate) fn bound(&mut self, boxes: &[OrientedBox]) {
         self.meta.root.bounds = boxes[NodeId::ROOT.index()];
         siblings(&self.topology, boxes, self.arrays.siblings.to_mut());
+        reaches(&self.topology, boxes, self.arrays.reaches.to_mut());
         self.renew_leaves();
         self.meta.outline = self.outlined();
     }
@@ -361,6 +362,7 @@ impl PointHierarchy {
             topology: &self.topology,
             root: &self.meta.root,
             siblings: &self.arrays.siblings,
+            reaches: &self.arrays.reaches,
             growths: [surface, obstacle],
         }
     }
@@ -408,6 +410,7 @@ impl PointHierarchy {
     #[must_use]
     pub fn bytes_of_nodes(&self) -> usize {
         size_of_val::<[_]>(&self.arrays.siblings)
+            + size_of_val::<[_]>(&self.arrays.reaches)
             + 2 * size_of_val::<[_]>(&self.arrays.surface_growths)
             + size_of_val::<[_]>(&self.arrays.sample_lists)
             + size_of_val::<[_]>(&self.arrays.coverings)

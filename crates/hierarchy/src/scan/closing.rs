@@ -19,7 +19,7 @@ use crate::scan::build::PointHierarchy;
 use crate::scan::sampling::quantile;
 use crate::tree::axes::{Spread, principal_axes};
 use crate::tree::topology::Topology;
-use crate::tree::wide::{Root, growths_of_siblings, siblings};
+use crate::tree::wide::{Root, growths_of_siblings, reaches, siblings};
 
 const WIDTH: usize = PointBlock::WIDTH;
 
@@ -84,6 +84,7 @@ impl Closing {
         let beyond = 0.5 * plan.support_radius(greatest);
         bound_parts(topology, (boxes, growths), (&arrays.blocks, parts), beyond);
         siblings(topology, boxes, arrays.siblings.to_mut());
+        reaches(topology, boxes, arrays.reaches.to_mut());
         let growths: &[[Growth; 2]] = growths;
         growths_of_siblings(topology, |id| growths[id][0], arrays.surface_growths.to_mut());
         growths_of_siblings(topology, |id| growths[id][1], arrays.obstacle_growths.to_mut());

@@ -12,7 +12,7 @@ use crate::point::disc::PointCode;
 use crate::point::gather::NeighbourList;
 use crate::point::leaf_block::LeafBlock;
 use crate::scan::outline::Outline;
-use crate::tree::wide::{Growths, Root, Siblings};
+use crate::tree::wide::{Growths, Lanes, Root, Siblings};
 
 /// The metadata of a hierarchy: everything stored that is not an array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,6 +62,8 @@ macro_rules! arrays {
 arrays! {
     /// The boxes of the children of each inner node.
     siblings: [Siblings] = b"TREE" 0,
+    /// The greatest local radius of the points under the same children.
+    reaches: [Lanes] = b"REAC" 0,
     /// The growths of the children's enclosures of the surface.
     surface_growths: [Growths] = b"GROW" 0,
     /// The growths of the children's enclosures of the obstacle.

@@ -23,7 +23,7 @@ use crate::scan::outline::Outline;
 use crate::scan::points::ScanPoints;
 use crate::scan::share;
 use crate::tree::topology::Topology;
-use crate::tree::wide::{Bare, Root, growths_of_siblings, siblings};
+use crate::tree::wide::{Bare, Root, growths_of_siblings, reaches, siblings};
 
 /// A scan without leaf blocks, marks and outline.
 pub(crate) struct Prepared {
@@ -122,6 +122,8 @@ fn bounds(
 ) -> Result<Arrays, WorkError> {
     let mut of_siblings = work.room(topology.inner())?;
     siblings(topology, boxes, &mut of_siblings);
+    let mut greatest = work.room(topology.inner())?;
+    reaches(topology, boxes, &mut greatest);
     let growths = |growths: &[Growth]| {
         let mut of_siblings = work.room(topology.inner())?;
         growths_of_siblings(topology, |id| growths[id], &mut of_siblings);
@@ -129,6 +131,7 @@ fn bounds(
     };
     Ok(Arrays {
         siblings: of_siblings.into(),
+        reaches: greatest.into(),
         surface_growths: growths(surface)?,
         obstacle_growths: growths(obstacle)?,
         ..Arrays::default()

@@ -93,9 +93,8 @@ pub(crate) fn principal_axes(
     });
     let solved: &[EigenBlock] = solved;
     change_each(boxes, AT_ONCE, |id, bounds| {
-        let [short, middle, long] = solved[id / WIDTH].get(id % WIDTH).vectors;
-        // The reversed order makes the frame left-handed; negating the last axis mends that.
-        bounds.axes = to_axes([long, middle, short.map(|c| -c)]);
+        let [_, middle, long] = solved[id / WIDTH].get(id % WIDTH).vectors;
+        bounds.axes = to_axes([long, middle]);
     });
 }
 

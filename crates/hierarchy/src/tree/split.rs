@@ -257,9 +257,8 @@ fn principal_axes(level: Level, items: &[Item]) -> [[f32; 3]; 3] {
     let n = items.len() as f64;
     let [x, y, z, xx, xy, xz, yy, yz, zz] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
     let eigen = symmetric_eigen([xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]);
-    // The reversed order makes the frame left-handed; negating the last axis mends that.
-    let [short, middle, long] = eigen.vectors;
-    to_axes([long, middle, short.map(|c| -c)])
+    let [_, middle, long] = eigen.vectors;
+    to_axes([long, middle])
 }
 
 /// Returns the sums of x y z xx xy xz yy yz zz of the points relative to the first, in lanes.

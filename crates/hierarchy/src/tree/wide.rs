@@ -7,12 +7,13 @@ use fearless_simd::{Simd, f32x4, f32x16, u32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::fill;
-use nearmiss_lanes::wide::product;
+use nearmiss_lanes::wide::{cross, product};
 use nearmiss_store::{Room, WorkError, Workspace};
 use serde::{Deserialize, Serialize};
 
-use crate::bounds::boxes::OrientedBox;
+use crate::bounds::boxes::{OrientedBox, frame};
 use crate::bounds::growth::Growth;
+use crate::bounds::lanes::Boxes;
 use crate::bounds::part::Part;
 use crate::tree::topology::{Children, FAN, Grandchildren, NodePair, Topology};
 
@@ -22,58 +23,55 @@ pub(crate) const LANES: usize = FAN * FAN;
 /// One number for each of four siblings.
 pub(crate) type Lanes = [f32; FAN];
 
-/// The boxes of up to four children. Unused lanes are zero.
+/// The boxes of up to four children. Unused lanes are zero. Three cache lines.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Siblings {
     pub(crate) centre: [Lanes; 3],
     pub(crate) half: [Lanes; 3],
-    pub(crate) axes: [[Lanes; 3]; 3],
-    /// The greatest local radius of the points in each box.
-    pub(crate) reach: Lanes,
+    /// The first two axes. The third one is their product.
+    pub(crate) axes: [[Lanes; 3]; 2],
 }
 
 impl Siblings {
-    pub(crate) const NONE: Self = Self {
-        centre: [[0.0; FAN]; 3],
-        half: [[0.0; FAN]; 3],
-        axes: [[[0.0; FAN]; 3]; 3],
-        reach: [0.0; FAN],
-    };
+    pub(crate) const NONE: Self =
+        Self { centre: [[0.0; FAN]; 3], half: [[0.0; FAN]; 3], axes: [[[0.0; FAN]; 3]; 2] };
 
+    /// Sets the box in a lane. Its greatest radius is not stored here.
     pub(crate) fn set(&mut self, lane: usize, bounds: &OrientedBox) {
         for k in 0..3 {
             self.centre[k][lane] = bounds.centre[k];
             self.half[k][lane] = bounds.half[k];
-            for j in 0..3 {
-                self.axes[k][j][lane] = bounds.axes[k][j];
+            for (axis, rows) in bounds.axes.iter().zip(&mut self.axes) {
+                rows[k][lane] = axis[k];
             }
         }
-        self.reach[lane] = bounds.reach;
     }
 
-    /// Returns the box in a lane.
+    /// Returns the box in a lane, given the greatest radius in it.
     #[inline]
-    pub(crate) fn get(&self, lane: usize) -> OrientedBox {
+    pub(crate) fn get(&self, lane: usize, reach: f32) -> OrientedBox {
         let of = |rows: &[Lanes; 3]| [rows[0][lane], rows[1][lane], rows[2][lane]];
-        OrientedBox {
-            centre: of(&self.centre),
-            half: of(&self.half),
-            axes: [of(&self.axes[0]), of(&self.axes[1]), of(&self.axes[2])],
-            reach: self.reach[lane],
-        }
+        let axes = frame([of(&self.axes[0]), of(&self.axes[1])]);
+        OrientedBox { centre: of(&self.centre), half: of(&self.half), axes, reach }
+    }
+
+    /// Returns the four boxes in lanes.
+    #[inline(always)]
+    pub(crate) fn boxes<S: Simd>(&self, simd: S) -> Boxes<f32x4<S>> {
+        let [u, v] = &self.axes;
+        let (u, v) = (rows(simd, u), rows(simd, v));
+        Boxes { centre: rows(simd, &self.centre), half: rows(simd, &self.half), axes: [u, v, cross(u, v)] }
     }
 
     /// Returns the squared distance of a position from each of the four boxes.
     #[inline(always)]
     pub(crate) fn distances_sq<S: Simd>(&self, simd: S, [x, y, z]: [f32; 3]) -> f32x4<S> {
-        let load = f32x4::load_array_ref;
-        let [cx, cy, cz] = &self.centre;
-        let d = [-(load(simd, cx) - x), -(load(simd, cy) - y), -(load(simd, cz) - z)];
+        let Boxes { centre: [cx, cy, cz], half, axes } = self.boxes(simd);
+        let d = [-(cx - x), -(cy - y), -(cz - z)];
         let mut sum = f32x4::splat(simd, 0.0);
-        for ([ax, ay, az], half) in self.axes.iter().zip(&self.half) {
-            let along = product([load(simd, ax), load(simd, ay), load(simd, az)], d);
-            let beyond = (along.abs() - load(simd, half)).max(0.0);
+        for k in 0..3 {
+            let beyond = (product(axes[k], d).abs() - half[k]).max(0.0);
             sum += beyond * beyond;
         }
         sum
@@ -112,6 +110,8 @@ pub struct Tree<'a> {
     pub(crate) root: &'a Root,
     /// The boxes of the children of each inner node.
     pub(crate) siblings: &'a [Siblings],
+    /// The greatest local radius of the points in the same boxes. Without entries, zero.
+    pub(crate) reaches: &'a [Lanes],
     /// The growths of the same children, by [`Part`]. Without entries, enclosures are the boxes.
     pub(crate) growths: [&'a [Growths]; 2],
 }
@@ -139,7 +139,7 @@ impl<'a> Tree<'a> {
     #[must_use]
     pub fn bounds(&self, id: NodeId) -> OrientedBox {
         match self.topology.parent(id) {
-            Some((parent, lane)) => self.siblings[parent.index()].get(lane),
+            Some((parent, lane)) => self.siblings[parent.index()].get(lane, self.reaches_below(parent)[lane]),
             None => self.root.bounds,
         }
     }
@@ -188,9 +188,15 @@ impl<'a> Tree<'a> {
     #[must_use]
     pub fn reach(&self, id: NodeId) -> f32 {
         match self.topology.parent(id) {
-            Some((parent, lane)) => self.siblings[parent.index()].reach[lane],
+            Some((parent, lane)) => self.reaches_below(parent)[lane],
             None => self.root.bounds.reach,
         }
+    }
+
+    /// Returns the greatest local radius of the points under each child of an inner node.
+    #[inline(always)]
+    pub(crate) fn reaches_below(&self, id: NodeId) -> &Lanes {
+        self.reaches.get(id.index()).unwrap_or(&[0.0; FAN])
     }
 
     /// Returns half the length of the longest child of an inner node.
@@ -211,11 +217,18 @@ impl<'a> Tree<'a> {
         NodeBounds { centre, half, axes, low, high }
     }
 
-    /// Returns the boxes and enclosures of the children of an inner node. Unused lanes are
-    /// unspecified.
+    /// Returns the boxes of the children of an inner node. Unused lanes are zero.
     ///
     /// # Panics
-    /// If the node is not an inner node. The same holds for the next method.
+    /// If the node is not an inner node. The same holds for the next two methods.
+    #[inline(always)]
+    #[must_use]
+    pub fn boxes_of_children<S: Simd>(&self, simd: S, id: NodeId) -> Boxes<f32x4<S>> {
+        self.siblings[id.index()].boxes(simd)
+    }
+
+    /// Returns the boxes and enclosures of the children of an inner node. Unused lanes are
+    /// unspecified.
     #[inline(always)]
     #[must_use]
     pub fn bounds_of_children<S: Simd>(&self, simd: S, part: Part, id: NodeId) -> NodeBounds<f32x4<S>> {
@@ -252,16 +265,10 @@ impl<'a> Tree<'a> {
 
     #[inline(always)]
     fn siblings<S: Simd>(&self, simd: S, part: Part, of: usize) -> NodeBounds<f32x4<S>> {
-        let Siblings { centre, half, axes: [u, v, w], .. } = &self.siblings[of];
+        let Boxes { centre, half, axes } = self.siblings[of].boxes(simd);
         let Growths([first, second, third]) = self.growths_below(part, of);
         let ((lx, ly), (lz, gx), (gy, gz)) = (halves(simd, first), halves(simd, second), halves(simd, third));
-        NodeBounds {
-            centre: rows(simd, centre),
-            half: rows(simd, half),
-            axes: [rows(simd, u), rows(simd, v), rows(simd, w)],
-            low: [lx, ly, lz],
-            high: [gx, gy, gz],
-        }
+        NodeBounds { centre, half, axes, low: [lx, ly, lz], high: [gx, gy, gz] }
     }
 }
 
@@ -374,6 +381,7 @@ pub(crate) struct Bare {
     topology: Topology,
     root: Root,
     siblings: Room<Siblings>,
+    reaches: Room<Lanes>,
 }
 
 impl Bare {
@@ -386,11 +394,19 @@ impl Bare {
         let root = Root { bounds: boxes[NodeId::ROOT.index()], growths: [Growth::default(); 2] };
         let mut room = work.room(topology.inner())?;
         siblings(&topology, boxes, &mut room);
-        Ok(Self { topology, root, siblings: room })
+        let mut greatest = work.room(topology.inner())?;
+        reaches(&topology, boxes, &mut greatest);
+        Ok(Self { topology, root, siblings: room, reaches: greatest })
     }
 
     pub(crate) fn tree(&self) -> Tree<'_> {
-        Tree { topology: &self.topology, root: &self.root, siblings: &self.siblings, growths: [&[]; 2] }
+        Tree {
+            topology: &self.topology,
+            root: &self.root,
+            siblings: &self.siblings,
+            reaches: &self.reaches,
+            growths: [&[]; 2],
+        }
     }
 }
 
@@ -402,6 +418,18 @@ pub(crate) fn siblings(topology: &Topology, boxes: &[OrientedBox], out: &mut [Si
             siblings.set(lane, &boxes[id.index()]);
         }
         siblings
+    });
+}
+
+/// Rearranges the greatest radii in the boxes of all nodes, in the order of their ids, into those of
+/// siblings.
+pub(crate) fn reaches(topology: &Topology, boxes: &[OrientedBox], out: &mut [Lanes]) {
+    fill(out, |i| {
+        let mut reaches = [0.0; FAN];
+        for (reach, id) in reaches.iter_mut().zip(topology.children(NodeId(id32(i))).iter()) {
+            *reach = boxes[id.index()].reach;
+        }
+        reaches
     });
 }
 

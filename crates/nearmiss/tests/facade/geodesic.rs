@@ -267,10 +267,11 @@ fn without_the_map_there_is_no_such_scan() {
     assert_eq!(whole.clone().with_graph(&cloud, &options, None).unwrap_err(), GraphError::NoClosePairs);
 
     // Files whose metadata claim the geodesic kernel.
+    let version = nearmiss::store::File::from_bytes(bytes(&whole), Check::Full).unwrap().version();
     for scan in [&bare, &without] {
         let meta =
             Meta { hierarchy: whole.meta().clone(), graph: scan.graph().map(|g| g.meta()), density: None };
-        let (mut writer, mut bytes) = (Writer::new(*b"SCAN", 10), Vec::new());
+        let (mut writer, mut bytes) = (Writer::new(*b"SCAN", version), Vec::new());
         writer.metadata(&meta).unwrap();
         (*whole).add_to(&mut writer).unwrap();
         if let Some(graph) = scan.graph() {

@@ -9,13 +9,13 @@ pub struct MeshQuality {
     pub p_min: f64,
     /// The number of such pairs at which the search stops, `k_min`. Default: 3.
     pub k_min: u32,
-    /// The number of cells that both surfaces must fill in a collision, 1 to 16. Default: 4.
+    /// The number of cells that both surfaces must fill in a collision, 1 to 16. Default: 6.
     pub shared: u32,
 }
 
 impl Default for MeshQuality {
     fn default() -> Self {
-        Self { p_min: 1.0, k_min: 3, shared: 4 }
+        Self { p_min: 1.0, k_min: 3, shared: 6 }
     }
 }
 

@@ -10,11 +10,13 @@ use crate::mesh::mesh_pair::MeshPairing;
 /// of `own`. `cosines` has the magnitudes of the products of own axes with the others.
 fn common(own: &OrientedBox, other: &OrientedBox, cosines: &[[f32; 3]; 3]) -> [[f32; 2]; 3] {
     let d = sub(other.centre, own.centre);
-    [0, 1, 2].map(|k| {
+    let mut parts = [[0.0; 2]; 3];
+    for k in 0..3 {
         let (middle, reach) = (dot(own.axes[k], d), dot(other.half, cosines[k]));
         let low = (-own.half[k]).max(middle - reach);
-        [low, own.half[k].min(middle + reach).max(low)]
-    })
+        parts[k] = [low, own.half[k].min(middle + reach).max(low)];
+    }
+    parts
 }
 
 /// The intersection of the boxes of two nodes: the smaller of the parts that the boxes cut out of
@@ -22,8 +24,13 @@ fn common(own: &OrientedBox, other: &OrientedBox, cosines: &[[f32; 3]; 3]) -> [[
 pub(crate) fn region(pair: &MeshPairing<'_>, nodes: NodePair) -> ContactRegion {
     let a = pair.a.tree.bounds(nodes.a);
     let b = pair.relative.moved(&pair.b.tree.bounds(nodes.b));
-    let cosines = a.axes.map(|u| b.axes.map(|v| dot(u, v).abs()));
-    let transposed = [0, 1, 2].map(|k| [0, 1, 2].map(|j| cosines[j][k]));
+    let (mut cosines, mut transposed) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+    for i in 0..3 {
+        for j in 0..3 {
+            cosines[i][j] = dot(a.axes[i], b.axes[j]).abs();
+            transposed[j][i] = cosines[i][j];
+        }
+    }
     let parts = [(&a, common(&a, &b, &cosines)), (&b, common(&b, &a, &transposed))];
     let radius = |part: &[[f32; 2]; 3]| {
         let half = part.map(|[low, high]| 0.5 * (high - low));

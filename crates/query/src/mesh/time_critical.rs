@@ -69,8 +69,9 @@ impl OddsVisitor for Search<'_, '_> {
     }
 
     #[inline]
-    fn likely(&mut self, filled: [f32; 2]) {
+    fn likely(&mut self, filled: [f32; 2]) -> ControlFlow<()> {
         self.count += u32::from(self.table.fewer(filled) <= self.threshold);
+        if self.count >= self.enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 

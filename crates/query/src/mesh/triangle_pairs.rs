@@ -5,9 +5,9 @@
 //! rounding included. The exact test decides about the other pairs.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_hierarchy::{LEAF_TRIANGLES, Relative, TriangleBlock};
-use nearmiss_lanes::wide::{bits, product, repeated, spread};
+use nearmiss_lanes::wide::{bits, cross, each_repeated, each_spread, product};
 
 type Vector<S> = [f32x16<S>; 3];
 
@@ -40,26 +40,30 @@ pub(crate) fn in_lanes<S: Simd>(
     [[each_repeated(p), each_repeated(q), each_repeated(r)], [each_spread(u), each_spread(v), each_spread(w)]]
 }
 
-#[inline(always)]
-fn each_repeated<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vector<S> {
-    [repeated(x), repeated(y), repeated(z)]
-}
-
-#[inline(always)]
-fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> Vector<S> {
-    [spread(x), spread(y), spread(z)]
-}
-
 /// Returns the lanes in which the bounding boxes of the triangles are disjoint. Each coordinate is off
 /// by at most the slack.
 #[inline(always)]
 fn are_boxes_apart<S: Simd>(a: &[Vector<S>; 3], b: &[Vector<S>; 3], slack: f32) -> mask32x16<S> {
-    let gap = |k: usize| {
-        let low = |t: &[Vector<S>; 3]| t[0][k].min(t[1][k]).min(t[2][k]);
-        let high = |t: &[Vector<S>; 3]| t[0][k].max(t[1][k]).max(t[2][k]);
-        (low(b) - high(a)).max(low(a) - high(b))
-    };
-    gap(0).max(gap(1)).max(gap(2)).simd_gt(2.5 * slack)
+    box_gap(a, b, 0).max(box_gap(a, b, 1)).max(box_gap(a, b, 2)).simd_gt(2.5 * slack)
+}
+
+// Functions instead of closures: those may be compiled separately, without the instruction set of
+// their caller.
+
+/// Returns the gap of the bounding boxes of two triangles along an axis.
+#[inline(always)]
+fn box_gap<S: Simd>(a: &[Vector<S>; 3], b: &[Vector<S>; 3], axis: usize) -> f32x16<S> {
+    (low(b, axis) - high(a, axis)).max(low(a, axis) - high(b, axis))
+}
+
+#[inline(always)]
+fn low<S: Simd>(t: &[Vector<S>; 3], axis: usize) -> f32x16<S> {
+    t[0][axis].min(t[1][axis]).min(t[2][axis])
+}
+
+#[inline(always)]
+fn high<S: Simd>(t: &[Vector<S>; 3], axis: usize) -> f32x16<S> {
+    t[0][axis].max(t[1][axis]).max(t[2][axis])
 }
 
 /// Returns the lanes in which all corners of `other` are on one side of the plane of `own`.
@@ -73,7 +77,7 @@ fn are_boxes_apart<S: Simd>(a: &[Vector<S>; 3], b: &[Vector<S>; 3], slack: f32) 
 fn is_beside<S: Simd>(own: &[Vector<S>; 3], other: &[Vector<S>; 3], slack: f32) -> mask32x16<S> {
     let [p, q, r] = own;
     let (e, f) = (sub(q, p), sub(r, p));
-    let n = cross(&e, &f);
+    let n = cross(e, f);
     let [x, y, z] = [sub(&other[0], p), sub(&other[1], p), sub(&other[2], p)];
     let [dx, dy, dz] = [product(n, x), product(n, y), product(n, z)];
     let far = size(&x).max(size(&y)).max(size(&z));
@@ -102,13 +106,17 @@ fn least_distances_by<S: Simd>(
     relative: &Relative,
 ) -> [f32; LEAF_TRIANGLES * LEAF_TRIANGLES] {
     let [a, b] = in_lanes(simd, blocks, relative);
-    let centres = |t: &[Vector<S>; 3]| [0, 1, 2].map(|k| t[0][k] + t[1][k] + t[2][k]);
-    let gap = gap_along(simd, &a, &b, sub(&centres(&b), &centres(&a)))
+    let gap = gap_along(simd, &a, &b, sub(&thrice_centre(&b), &thrice_centre(&a)))
         .max(gap_along(simd, &a, &b, normal(&a)))
         .max(gap_along(simd, &a, &b, normal(&b)));
     // Coordinates are off by δ, so the gap along a direction is off by 2√3 δ, and by less than 1e-6
     // of itself because the direction is a unit vector up to rounding only.
     (gap * (1.0 - 1e-5) - 6.0 * relative.slack()).max(0.0).to_array()
+}
+
+#[inline(always)]
+fn thrice_centre<S: Simd>(t: &[Vector<S>; 3]) -> Vector<S> {
+    [t[0][0] + t[1][0] + t[2][0], t[0][1] + t[1][1] + t[2][1], t[0][2] + t[1][2] + t[2][2]]
 }
 
 /// Returns the gap of two triangles along a direction, of any length.
@@ -129,12 +137,7 @@ fn gap_along<S: Simd>(simd: S, a: &[Vector<S>; 3], b: &[Vector<S>; 3], way: Vect
 
 #[inline(always)]
 fn normal<S: Simd>([p, q, r]: &[Vector<S>; 3]) -> Vector<S> {
-    cross(&sub(q, p), &sub(r, p))
-}
-
-#[inline(always)]
-fn cross<S: Simd>(e: &Vector<S>, f: &Vector<S>) -> Vector<S> {
-    [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]
+    cross(sub(q, p), sub(r, p))
 }
 
 #[inline(always)]

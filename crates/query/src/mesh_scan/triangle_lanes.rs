@@ -6,7 +6,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x4, mask32x16};
 use nearmiss_hierarchy::{LEAF_TRIANGLES, LeafBlock, OrientedBox, Relative, THICKNESS, TriangleBlock};
-use nearmiss_lanes::wide::{Vectors, along, bits, load, product, squared};
+use nearmiss_lanes::wide::{Vectors, along, bits, cross, load, product, squared};
 
 /// Coordinates beyond this have squares near the end of single precision.
 const FARTHEST: f32 = 1e15;
@@ -80,11 +80,6 @@ fn times<S: Simd>(v: &[f32x4<S>; 3], by: f32x4<S>) -> [f32x4<S>; 3] {
 }
 
 #[inline(always)]
-fn cross<S: Simd>(e: &[f32x4<S>; 3], f: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
-    [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]
-}
-
-#[inline(always)]
 fn stored<S: Simd>(v: &[f32x4<S>; 3]) -> [Four; 3] {
     [v[0].to_array(), v[1].to_array(), v[2].to_array()]
 }
@@ -132,8 +127,7 @@ impl Prepared {
             times(&edges[2], per_length(simd, lengths[2])),
         ];
         // Each is the normal times the sine of the angle at a corner.
-        let [p, q, r] =
-            [cross(&along[0], &along[1]), cross(&along[1], &along[2]), cross(&along[2], &along[0])];
+        let [p, q, r] = [cross(along[0], along[1]), cross(along[1], along[2]), cross(along[2], along[0])];
         let normal = [p[0] + q[0] + r[0], p[1] + q[1] + r[1], p[2] + q[2] + r[2]];
         // Rounding tilts this sum by more the thinner a triangle is. A tilt along its longest edge would
         // move the far end of the plane.
@@ -150,7 +144,7 @@ impl Prepared {
         let sines = product(normal, normal).sqrt();
         let is_face: mask32x4<S> = sines.simd_gt(f32x4::splat(simd, NEEDLE));
         let normal = times(&normal, per_length(simd, sines));
-        let [u, v, w] = [cross(&normal, &along[0]), cross(&normal, &along[1]), cross(&normal, &along[2])];
+        let [u, v, w] = [cross(normal, along[0]), cross(normal, along[1]), cross(normal, along[2])];
         // A needle is no wider than its longest edge times the sum of its sines.
         let width = is_face.select(zero, longest * NEEDLE);
         let off = longest * OF_EDGES + width + 4.0 * slack;

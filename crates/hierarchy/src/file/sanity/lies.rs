@@ -58,9 +58,11 @@ fn place(scan: &PointHierarchy, id: usize) -> (usize, usize) {
 fn lying(scan: &mut PointHierarchy, id: usize, lie: impl FnOnce(&mut OrientedBox)) {
     let (parent, lane) = place(scan, id);
     let siblings = &mut scan.arrays.siblings.to_mut()[parent];
-    let mut bounds = siblings.get(lane);
+    let reach = &mut scan.arrays.reaches.to_mut()[parent][lane];
+    let mut bounds = siblings.get(lane, *reach);
     lie(&mut bounds);
     siblings.set(lane, &bounds);
+    *reach = bounds.reach;
 }
 
 #[test]
@@ -70,13 +72,15 @@ fn boxes_that_are_none() {
         for k in 0..3 {
             wrong(&|bounds| bounds.centre[k] = value);
             wrong(&|bounds| bounds.half[k] = value);
+        }
+        for k in 0..2 {
             wrong(&|bounds| bounds.axes[k][1] = value);
         }
         wrong(&|bounds| bounds.reach = value);
         plain("the box of the root is invalid", |scan| scan.meta.root.bounds.half[0] = value);
     }
     wrong(&|bounds| bounds.half[2] = -1e-3);
-    wrong(&|bounds| bounds.axes[2][0] = 1.01);
+    wrong(&|bounds| bounds.axes[1][0] = 1.01);
     wrong(&|bounds| bounds.axes = [[0.0; 3]; 3]);
     wrong(&|bounds| bounds.axes[1] = bounds.axes[0]);
     deep("the box of node 0", |scan| scan.meta.root.bounds.axes[1] = scan.meta.root.bounds.axes[0]);
@@ -89,6 +93,9 @@ fn lanes_without_a_child_that_say_something() {
     let few = inner.into_iter().find(|&id| scan.topology().children(id).len() < 4).unwrap();
     deep(&format!("the boxes of the children of node {}", few.0), |scan| {
         scan.arrays.siblings.to_mut()[few.index()].half[0][3] = 7.0;
+    });
+    deep(&format!("the boxes of the children of node {}", few.0), |scan| {
+        scan.arrays.reaches.to_mut()[few.index()][3] = 7.0;
     });
 }
 

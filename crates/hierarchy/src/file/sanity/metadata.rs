@@ -49,6 +49,7 @@ impl PointHierarchy {
             ("kinds", self.arrays.codes.len(), points),
             ("source indices", self.arrays.source.len(), points),
             ("boxes", self.arrays.siblings.len(), inner),
+            ("greatest radii", self.arrays.reaches.len(), inner),
             ("enclosures", self.arrays.surface_growths.len(), inner),
             ("enclosures of the obstacle", self.arrays.obstacle_growths.len(), inner),
             ("leaf blocks", self.arrays.leaf_blocks.len(), leaves * LeafParts::blocks_a_leaf(&self.topology)),

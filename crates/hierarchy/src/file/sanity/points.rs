@@ -13,7 +13,7 @@ use crate::scan::build::PointHierarchy;
 /// Tolerance for the squared length of normals, which are unit up to rounding.
 const NORMAL: f32 = 1e-5;
 
-/// Bound on the rounding error of a coordinate in a box that was grown by 2e-6 of its coordinates.
+/// Bound on the rounding error of a coordinate in a box that was grown by 3e-6 of its coordinates.
 const SLACK: f32 = 1e-6;
 
 /// Tolerance for a sine computed as √(1 − (n·axis)²), whose square is about 1e-7 off.

@@ -16,8 +16,7 @@ fn with_boundless_boxes(scan: &Scan, half: f32) -> Scan {
     let boxes = sections.iter().find(|s| s.id.tag == *b"TREE").unwrap();
     let start = usize::try_from(boxes.offset).unwrap();
     let end = start + usize::try_from(boxes.length).unwrap();
-    let reach = scan.boxes().next().unwrap().reach;
-    let vast = [0.0, 0.0, 0.0, half, half, half, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, reach];
+    let vast = [0.0, 0.0, 0.0, half, half, half, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     // A row of four siblings for each number.
     let vast: Vec<u8> = vast.iter().flat_map(|x: &f32| x.to_le_bytes().repeat(4)).collect();
     for siblings in bytes[start..end].chunks_exact_mut(vast.len()) {

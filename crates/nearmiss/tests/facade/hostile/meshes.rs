@@ -225,7 +225,7 @@ fn lengths_that_contradict_each_other_are_refused() {
         fn shorter<T>(all: &[T], cut: bool) -> &[T] {
             &all[..all.len() - usize::from(cut)]
         }
-        let siblings = file.array::<[u8; 256]>(TAGS[0], 0).unwrap();
+        let siblings = file.array::<[[u8; 64]; 3]>(TAGS[0], 0).unwrap();
         writer.section(TAGS[0], 0, shorter(&siblings, cut == 0)).unwrap();
         writer.section(TAGS[1], 0, shorter(arrays.blocks, cut == 1)).unwrap();
         writer.section(TAGS[2], 0, shorter(arrays.vertices, cut == 2)).unwrap();
@@ -251,7 +251,7 @@ fn lengths_that_contradict_each_other_are_refused() {
     // No triangles at all.
     let mut writer = Writer::new(Mesh::KIND, file.version());
     writer.metadata(mesh.meta()).unwrap();
-    writer.section(TAGS[0], 0, &[] as &[[u8; 256]]).unwrap();
+    writer.section(TAGS[0], 0, &[] as &[[[u8; 64]; 3]]).unwrap();
     writer.section(TAGS[1], 0, &arrays.blocks[..0]).unwrap();
     writer.section(TAGS[2], 0, arrays.vertices).unwrap();
     writer.section(TAGS[3], 0, &arrays.triangles[..0]).unwrap();
@@ -272,7 +272,7 @@ fn a_mesh_cut_anywhere_is_refused_even_if_its_header_owns_up() {
 
 #[test]
 fn a_mesh_of_another_version_or_another_kind_is_refused_by_name() {
-    for (version, remedy) in [(0, "prepare it again"), (2, "update the program"), (999, "update the program")]
+    for (version, remedy) in [(0, "prepare it again"), (3, "update the program"), (999, "update the program")]
     {
         let mut bytes = Vec::new();
         let mut writer = Writer::new(Mesh::KIND, version);
