@@ -4,15 +4,18 @@
 //! Valgrind runs the AVX2 code on every processor that has AVX2. On other processors the counts
 //! differ.
 
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use nearmiss::{
     BuildOptions, Check, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Mesh,
-    MeshBuildOptions, MeshScanPair, MeshScanPlan, Pair, PairHint, PointCloud, Pose, Scan, Scratch,
+    MeshBuildOptions, MeshPair, MeshQuality, MeshScanPair, MeshScanPlan, MeshScratch, Pair, PairHint,
+    PointCloud, Pose, Scan, Scratch,
 };
 use nearmiss_testdata::arbitrary::{rng, unit_vector};
 use nearmiss_testdata::scanner::{self, Frame};
+use object::{Object as _, ObjectSymbol as _};
 
 use super::cases::{Case, in_room};
 use crate::object::Object;
@@ -39,6 +42,12 @@ pub enum Scenario {
     MeshScanDistance,
     /// Distances of an object's mesh in the hall.
     MeshHallDistance,
+    /// Exact verdicts of two meshes over the sweep.
+    Meshes,
+    /// Time-critical verdicts of the same, stopped by `p_min`.
+    MeshesLikely,
+    /// Distances of the same.
+    MeshesDistance,
     /// Hinted verdicts of small steps near contact.
     Hinted,
     /// Views of scans.
@@ -51,7 +60,7 @@ pub enum Scenario {
 
 impl Scenario {
     /// All scenarios with their names.
-    pub const ALL: [(Self, &'static str); 13] = [
+    pub const ALL: [(Self, &'static str); 16] = [
         (Self::Sweep, "sweep"),
         (Self::Near, "near"),
         (Self::Certified, "certified"),
@@ -61,6 +70,9 @@ impl Scenario {
         (Self::MeshScan, "mesh-scan"),
         (Self::MeshScanDistance, "mesh-scan-distance"),
         (Self::MeshHallDistance, "mesh-hall-distance"),
+        (Self::Meshes, "meshes"),
+        (Self::MeshesLikely, "meshes-likely"),
+        (Self::MeshesDistance, "meshes-distance"),
         (Self::Hinted, "hinted"),
         (Self::View, "view"),
         (Self::Open, "open"),
@@ -96,6 +108,12 @@ impl Scenario {
             Self::MeshScan => mesh_verdicts(&sweep()?, "dragon-23k", &certified),
             Self::MeshScanDistance => mesh_distances(&sweep()?, "dragon-23k"),
             Self::MeshHallDistance => mesh_distances(&hall()?, "dragon-5k"),
+            Self::Meshes => meshes(|pair, scratch| pair.collide(scratch).likely_meets()),
+            Self::MeshesLikely => {
+                let quality = MeshQuality::default().with_p_min(0.99);
+                meshes(|pair, scratch| pair.collide_likely(&quality, scratch).likely_meets())
+            }
+            Self::MeshesDistance => meshes(|pair, scratch| pair.distance(scratch).upper > 0.0),
             Self::Hinted => hinted(&near()?, &quick),
             Self::View => {
                 let Case { scans, questions, .. } = sweep()?;
@@ -147,6 +165,23 @@ fn has_avx2() -> bool {
 #[cfg(not(target_arch = "x86_64"))]
 const fn has_avx2() -> bool {
     false
+}
+
+/// Returns the names of vector instructions that `program` calls as functions. A closure, or a function
+/// that is not inlined, is compiled without the instruction set of its caller; each operation in it is
+/// then a call.
+///
+/// # Errors
+/// When the program cannot be read or has no symbols.
+pub fn called_instructions(program: &Path) -> Result<Vec<String>, Failure> {
+    const KERNEL: &str = "__fearless_simd_kernel";
+    let bytes = fs::read(program)?;
+    let file = object::File::parse(&*bytes)?;
+    let names: Vec<&str> = file.symbols().filter_map(|symbol| symbol.name().ok()).collect();
+    if names.is_empty() {
+        return Err(format!("expected symbols in {}, got none; do not strip it", program.display()).into());
+    }
+    Ok(names.into_iter().filter(|name| name.contains(KERNEL)).map(Into::into).collect())
 }
 
 /// Counts a scenario with valgrind. `program` runs the scenario when given `arguments`.
@@ -255,6 +290,21 @@ fn mesh_distances(case: &Case, name: &str) -> Result<(), Failure> {
         for question in &case.questions {
             let [at_a, at_b] = &question.poses;
             std::hint::black_box(MeshScanPair::new(a.at(at_a), b.at(at_b)).distance(&plan, &mut scratch));
+        }
+    });
+    Ok(())
+}
+
+/// Asks about two copies of a mesh at the poses of the sweep.
+fn meshes(ask: impl Fn(&MeshPair<'_>, &mut MeshScratch) -> bool) -> Result<(), Failure> {
+    let case = sweep()?;
+    let (mesh, mut scratch) = (mesh(&case, "dragon-23k")?, MeshScratch::default());
+    // The first time-critical query makes a table.
+    let _warm = ask(&MeshPair::new(mesh.at(&Pose::IDENTITY), mesh.at(&Pose::IDENTITY)), &mut scratch);
+    counted(&mut || {
+        for question in &case.questions {
+            let [at_a, at_b] = &question.poses;
+            std::hint::black_box(ask(&MeshPair::new(mesh.at(at_a), mesh.at(at_b)), &mut scratch));
         }
     });
     Ok(())

@@ -22,7 +22,8 @@ pub(crate) struct Arguments {
     run: bool,
 }
 
-/// Returns `true` if no scenario exceeds its count on record by too much.
+/// Returns `true` if no scenario exceeds its count on record by too much, and no vector instruction is
+/// called as a function.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     if arguments.run {
         for name in &arguments.scenarios {
@@ -66,5 +67,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     if record {
         fs::write(&path, new)?;
     }
-    Ok(record || is_clean)
+    let called = counts::called_instructions(&program)?;
+    for name in &called {
+        println!("called as a function, by code without its instruction set: {name}");
+    }
+    Ok((record || is_clean) && called.is_empty())
 }
