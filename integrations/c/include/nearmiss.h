@@ -380,7 +380,8 @@ typedef struct NearmissScanAbout {
      */
     uint64_t points;
     /*
-     The least corner of the bounds.
+     The least corner of the bounds of the points. The obstacle, and so a hit of a ray, may exceed them
+     by up to `reach`.
      */
     double min[3];
     /*

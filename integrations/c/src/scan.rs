@@ -47,7 +47,8 @@ pub enum Checks {
 pub struct ScanAbout {
     /// The number of points.
     pub points: u64,
-    /// The least corner of the bounds.
+    /// The least corner of the bounds of the points. The obstacle, and so a hit of a ray, may exceed them
+    /// by up to `reach`.
     pub min: [f64; 3],
     /// The greatest corner of the bounds.
     pub max: [f64; 3],

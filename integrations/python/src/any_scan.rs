@@ -49,7 +49,8 @@ impl AnyScan {
         self.0.frame(py).len()
     }
 
-    /// The least and the greatest corner, of shape (2, 3).
+    /// The least and the greatest corner of the points, of shape (2, 3). The obstacle, and so a hit of a ray,
+    /// may exceed them by up to `reach`.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let scan = self.0.frame(py);

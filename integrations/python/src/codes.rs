@@ -124,6 +124,18 @@ macro_rules! answer {
                 format!("<{} {}>", stringify!($class), $repr(&self.0))
             }
 
+            fn __reduce__<'py>(
+                slf: &pyo3::Bound<'py, Self>,
+            ) -> PyResult<(pyo3::Bound<'py, PyAny>, (pyo3::Bound<'py, pyo3::types::PyBytes>,))> {
+                let bytes = pyo3::types::PyBytes::new(slf.py(), bytemuck::bytes_of(&slf.get().0));
+                Ok((slf.get_type().getattr("_from_bytes")?, (bytes,)))
+            }
+
+            #[staticmethod]
+            fn _from_bytes(data: &[u8]) -> PyResult<Self> {
+                $crate::record::read(data).map(Self)
+            }
+
             // Every object is true by default, also the answer that two things are apart.
             fn __bool__(&self) -> PyResult<bool> {
                 let properties = [$(stringify!($touches),)? $(stringify!($field)),*];
@@ -137,7 +149,7 @@ pub(crate) use answer;
 
 /// Returns the error of an answer that is used as a condition.
 pub(crate) fn no_truth_value(class: &str, property: &str) -> PyErr {
-    PyTypeError::new_err(format!("expected a condition, such as `answer.{property}`, got an {class}"))
+    PyTypeError::new_err(format!("expected a condition, such as `answer.{property}`, got the {class} itself"))
 }
 
 /// Reads a field as it is.

@@ -1,11 +1,13 @@
 //! Records: plain structs that NumPy reads as structured arrays.
 
-use bytemuck::Pod;
 use bytemuck::allocation::cast_vec;
+use bytemuck::{Pod, try_pod_read_unaligned};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyList};
+
+use crate::failure::refused;
 
 /// A name, a NumPy format and the offset in bytes.
 pub(crate) type Field = (&'static str, &'static str, usize);
@@ -54,6 +56,17 @@ fn dtype<'py, R: Record>(py: Python<'py>) -> PyResult<&'py Bound<'py, PyAny>> {
         py.import("numpy")?.call_method1("dtype", (about,)).map(Bound::unbind)
     })?;
     Ok(made.bind(py))
+}
+
+/// Reads a record from the bytes of one.
+pub(crate) fn read<R: Pod>(bytes: &[u8]) -> PyResult<R> {
+    try_pod_read_unaligned(bytes).ok().ok_or_else(|| {
+        refused(format!(
+            "expected {} bytes of an answer of this version, got {}",
+            size_of::<R>(),
+            bytes.len()
+        ))
+    })
 }
 
 /// Returns records as a structured array with one dimension, which takes over their memory.

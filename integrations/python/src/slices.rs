@@ -153,7 +153,10 @@ impl SliceMap {
     /// Return the place nearest to `near`, of shape (3,), where an avatar can stand; None if there is none.
     ///
     /// `size` is the width, depth and height of the avatar, `climb` the height that it steps up at once.
-    #[pyo3(signature = (near, *, size = [0.4, 0.4, 1.6], climb = 0.35))]
+    #[pyo3(
+        signature = (near, *, size = [0.4, 0.4, 1.6], climb = 0.35),
+        text_signature = "($self, near, *, size=(0.4, 0.4, 1.6), climb=0.35)"
+    )]
     fn standing(&self, near: &Bound<'_, PyAny>, size: [f64; 3], climb: f64) -> PyResult<Option<[f64; 3]>> {
         let (avatar, place) = (avatar(size, climb)?, vector(near, "the place")?);
         let found = near.py().detach(|| avatar.nearest_standing(&self.0, place)).map_err(refused)?;
@@ -164,7 +167,10 @@ impl SliceMap {
     ///
     /// Returns the points to walk to, of shape (N, 2), the end of shape (3,), and the length. Raises
     /// `ValueError` if there is no route; the message says how near it gets.
-    #[pyo3(signature = (start, goal, *, size = [0.4, 0.4, 1.6], climb = 0.35, falls = false))]
+    #[pyo3(
+        signature = (start, goal, *, size = [0.4, 0.4, 1.6], climb = 0.35, falls = false),
+        text_signature = "($self, start, goal, *, size=(0.4, 0.4, 1.6), climb=0.35, falls=False)"
+    )]
     fn route<'py>(
         &self,
         start: &Bound<'py, PyAny>,
@@ -183,7 +189,10 @@ impl SliceMap {
     /// Walk an avatar from `start`, of shape (3,), to points of shape (N, 2) in turn, sliding along walls.
     ///
     /// Returns the places of its feet after each step, of shape (M, 3).
-    #[pyo3(signature = (start, points, *, size = [0.4, 0.4, 1.6], climb = 0.35))]
+    #[pyo3(
+        signature = (start, points, *, size = [0.4, 0.4, 1.6], climb = 0.35),
+        text_signature = "($self, start, points, *, size=(0.4, 0.4, 1.6), climb=0.35)"
+    )]
     fn walk<'py>(
         &self,
         py: Python<'py>,

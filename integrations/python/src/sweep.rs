@@ -56,11 +56,13 @@ pub(crate) fn sweep(
 }
 
 /// The numbers of a sweep. No array holds them.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(crate) struct SweepRecord {
     verdict: i8,
     evidence: i8,
     reason: i8,
+    _padding: [u8; 5],
     t_free: f64,
     t_hit: f64,
     clearance: f64,
@@ -76,6 +78,7 @@ impl SweepRecord {
             verdict: -1,
             evidence: -1,
             reason: 0,
+            _padding: [0; 5],
             t_free: NONE,
             t_hit: NONE,
             clearance: NONE,

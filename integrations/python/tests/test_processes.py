@@ -3,6 +3,7 @@
 import gc
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 import time
@@ -137,10 +138,34 @@ class Concurrency(unittest.TestCase):
             again = pool.apply_async(nearmiss.Scan, (plate(),)).get(60)
         self.assertEqual(again.to_bytes(), nearmiss.Scan(plate()).to_bytes())
 
-    def test_spawned_processes_get_pickled_scans(self):
+    def test_spawned_processes_get_pickled_scans_and_return_answers(self):
+        scan = dragon()
         with multiprocessing.get_context("spawn").Pool(1) as pool:
-            count = pool.apply_async(len, (dragon(),)).get(120)
-        self.assertEqual(count, len(dragon()))
+            count = pool.apply_async(len, (scan,)).get(120)
+            answer = pool.apply_async(scan.collide, (scan,)).get(120)
+        self.assertEqual(count, len(scan))
+        self.assertEqual(repr(answer), repr(scan.collide(scan)))
+
+    def test_answers_are_pickled_whole(self):
+        scan, ball = dragon(), nearmiss.Shape.sphere([0.0, 0.1, 0.0], 0.02)
+        target = scan.target()
+        away = nearmiss.pose(translation=[0.3, 0.0, 0.0])
+        for answer in [
+            scan.collide(scan, away),
+            scan.distance(scan, away),
+            target.touch(ball),
+            target.distance(ball),
+            target.cast([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]),
+            nearmiss.sweep(scan, scan, [away, nearmiss.pose(translation=[0.4, 0.0, 0.0])]),
+        ]:
+            with self.subTest(type(answer).__name__):
+                again = pickle.loads(pickle.dumps(answer))
+                names = [name for name in dir(answer) if not name.startswith("_")]
+                self.assertGreater(len(names), 4)
+                for name in names:
+                    self.assertEqual(repr(getattr(again, name)), repr(getattr(answer, name)), name)
+        with self.assertRaises(ValueError):
+            nearmiss.Answer._from_bytes(b"short")
 
 
 class Pictures(unittest.TestCase):
