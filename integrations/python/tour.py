@@ -8,6 +8,8 @@ import numpy as np
 import nearmiss
 from nearmiss import Shape
 
+if len(sys.argv) < 2:
+    sys.exit(__doc__)
 # Prepare once, save, open by mapping. A scan is also made from an array: nearmiss.Scan(points).
 scan = nearmiss.Scan.read(sys.argv[1], progress=lambda share: print(f"\rpreparing {share:4.0%}", end=""))
 scan.save("tour.nm")
@@ -18,9 +20,7 @@ print("\n", scan, "bounds", scan.bounds.tolist())
 size = float(np.ptp(scan.bounds, axis=0).max())
 apart = nearmiss.pose(translation=[1.2 * size, 0, 0])
 near = nearmiss.pose(translation=[0.45 * size, 0.05 * size, 0])
-print(scan.collide(scan, apart))
-print(scan.collide(scan, near))
-print(scan.distance(scan, apart))
+print(scan.collide(scan, apart), scan.collide(scan, near), scan.distance(scan, apart), sep="\n")
 
 # A hundred thousand poses on all cores give a structured array.
 rng = np.random.default_rng(0)

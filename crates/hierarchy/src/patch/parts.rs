@@ -172,31 +172,35 @@ fn extents<S: Simd>(
     let mut low = [[most; 3]; 3];
     let mut high = [[none; 3]; 3];
     let mut reach = f32x16::splat(simd, 0.0);
+    let zero = f32x16::splat(simd, 0.0);
     for number in range.start / WIDTH..range.end.div_ceil(WIDTH) {
         let block = &parts[number];
-        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, &range)));
         let lanes = |row: &[f32; WIDTH]| f32x16::load_array_ref(simd, row);
         let (position, normal) = (load(simd, &points[number].position), load(simd, &block.normal));
         let (disc, ball) = (lanes(&block.disc), lanes(&block.ball));
         let (cell, slab) = (lanes(&block.cell), lanes(&block.slab));
-        let radius = simd.select_f32x16(inside, lanes(&block.radius), f32x16::splat(simd, 0.0));
-        reach = reach.max(radius);
+        let [u, v, w] = axes;
+        let cosines = [along(normal, *u), along(normal, *v), along(normal, *w)];
+        let squares = [cosines[0] * cosines[0], cosines[1] * cosines[1], cosines[2] * cosines[2]];
+        let own = lanes_of(number, &range);
+        let is_whole = own == (1 << WIDTH) - 1;
+        let inside = mask32x16::from_bitmask(simd, u64::from(own));
+        let radius = lanes(&block.radius);
+        reach = reach.max(simd.select_f32x16(inside, radius, zero));
         for k in 0..3 {
-            // ‖n × axis‖, without the cancellation of √(1 − (n·axis)²).
-            let [ax, ay, az] = axes[k];
-            let [x, y, z] = normal;
-            let cosine = along(normal, axes[k]).abs();
-            let (x, y, z) = (z * ay - y * az, x * az - z * ax, y * ax - x * ay);
-            let sine = (x * x + y * y + z * z).sqrt();
-            let spreads = [
-                (disc * (sine + THICKNESS)).max(ball),
-                cell * sine + slab * cosine,
-                f32x16::splat(simd, 0.0),
-            ];
+            // The axes are orthonormal. This does not cancel as √(1 − (n·axis)²) does.
+            let sine = (squares[(k + 1) % 3] + squares[(k + 2) % 3]).sqrt();
+            let spreads =
+                [(disc * (sine + THICKNESS)).max(ball), cell * sine + slab * cosines[k].abs(), zero];
             let middle = along(position, axes[k]);
             for j in 0..3 {
-                low[j][k] = low[j][k].min(simd.select_f32x16(inside, middle - spreads[j], most));
-                high[j][k] = high[j][k].max(simd.select_f32x16(inside, middle + spreads[j], none));
+                let (mut least, mut greatest) = (middle - spreads[j], middle + spreads[j]);
+                if !is_whole {
+                    least = simd.select_f32x16(inside, least, most);
+                    greatest = simd.select_f32x16(inside, greatest, none);
+                }
+                low[j][k] = low[j][k].min(least);
+                high[j][k] = high[j][k].max(greatest);
             }
         }
     }

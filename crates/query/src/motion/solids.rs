@@ -9,7 +9,7 @@ use nearmiss_geometry::{Aabb, Motion, Pose, Screw};
 use crate::motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepReason};
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::{ShapeContact, ShapeDistance};
-use crate::solid::contacts::{Candidate, contacts};
+use crate::solid::contacts::{Candidates, contacts};
 use crate::solid::core::Solid;
 use crate::solid::distance::distance;
 use crate::solid::elements::Elements;
@@ -37,7 +37,7 @@ const MOST: u32 = 100_000;
 const ROUNDING: f64 = 1e-9;
 
 /// The memory of a sweep.
-pub(crate) type Working<'a> = (Level, &'a mut ViewScratch, &'a mut Vec<Candidate>, &'a mut Vec<ShapeContact>);
+pub(crate) type Working<'a> = (Level, &'a mut ViewScratch, &'a mut Candidates, &'a mut Vec<ShapeContact>);
 
 /// A shape along its motion.
 struct Course<'s, 'a> {

@@ -1,156 +1,297 @@
 //! The contact manifold of a shape and a scan: up to eight points, each with a normal and a depth.
 //!
-//! Each disc that the shape touches gives one contact, the deepest place of the shape over the disc.
-//! Each ball gives one along the way from its centre. The deepest is selected first, then always the
-//! one furthest from those selected, as for two scans (`contact::manifold`).
+//! Each disc that the shape touches can give one contact, the deepest place of the shape over the disc.
+//! Each ball can give one along the way from its centre. The deepest is selected first, then those that
+//! continue contacts of the last frame, then always the one whose disc or ball is furthest from those
+//! selected. A shape may touch hundreds of discs, so a place is computed only where the selection
+//! depends on it: the bounds of [`gather`](crate::solid::gather) tell where the deepest may be.
 
-use std::ops::ControlFlow;
+use std::cmp::Ordering;
 
-use fearless_simd::{Level, Simd, f32x4};
-use nearmiss_geometry::NodeId;
+use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{PlaceVisitor, PointKind, Siblings, THICKNESS};
-use nearmiss_lanes::wide::Bits;
+use nearmiss_hierarchy::{PointKind, THICKNESS};
 use nearmiss_surface::Status;
 
 use crate::ask::options::Detail;
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
-use crate::solid::core::{Gap, Solid};
+use crate::solid::core::Solid;
 use crate::solid::descent::Near;
-use crate::solid::elements::{Element, Elements};
+use crate::solid::elements::Elements;
+use crate::solid::gather::{Candidate, Gather, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
+use crate::solid::place::{Place, of_disc, place_at, place_beside};
+use crate::solid::sides::Sides;
 
 type Vector = Vector3<f64>;
 
-/// Two contacts of a manifold are at least this far apart, in local radii.
-const SPREAD: f64 = 0.5;
+/// Another contact may be this much deeper than the first, in local radii.
+const LEVEL: f64 = 0.005;
 
-/// A contact of the last frame within this distance decides the side, in local radii.
-const SIDE: f64 = 4.0;
-
-/// Steps to the deepest place over a disc; two are enough over a plane.
-const ROUNDS: u32 = 8;
+/// Candidates that are compared with a contact of the last frame.
+const TRIES: usize = 3;
 
 /// Evaluations that move the deepest contact over the surface.
 const SLIDES: u32 = 3;
 
-/// The precision of a depth, in disc radii.
-const PRECISION: f64 = 1e-3;
+/// Reusable memory.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Candidates {
+    found: Vec<Candidate>,
+    missed: Vec<Candidate>,
+    places: Vec<Met>,
+}
 
-/// A place where the shape touches a disc or a ball, in the world.
+/// A contact, where it is in the stored frame, and the index and the local radius of its point.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Candidate {
+struct Met {
     contact: ShapeContact,
-    /// The index and the local radius of the point.
+    at: Vector,
     i: usize,
     band: f64,
-    /// The squared distance from the nearest selected contact.
-    away_sq: f64,
-    /// `true` if the shape's centre is behind the surface.
-    is_behind: bool,
 }
 
-struct Gather<'s, 'a> {
-    near: Near<'s, 'a>,
-    hint: Option<&'s ShapeHint>,
-    /// The point whose side of a surface is that of the shape, in the stored frame.
-    inside: Vector,
-    is_oriented: bool,
+/// The selection of contacts among candidates.
+struct Selection<'s, 'a> {
+    elements: &'s Elements<'a>,
+    solid: &'s Solid<'s>,
     found: &'s mut Vec<Candidate>,
-    /// The nearest disc whose thickness the shape touches beside its rim, where it has no depth.
-    beside: Option<Candidate>,
+    places: &'s mut Vec<Met>,
+    /// Candidates without a place, which the shape may be beside.
+    missed: &'s mut Vec<Candidate>,
+    taken: [Option<Met>; MOST],
+    count: usize,
+    /// The furthest candidate from all contacts, if no candidate was removed since the last contact.
+    next: Option<usize>,
 }
 
-/// Writes the manifold of `solid` and the scan to `contacts`.
+/// Writes the manifold of `solid` and the scan to `out`.
 pub(crate) fn contacts(
     elements: &Elements<'_>,
     solid: Option<&Solid<'_>>,
     hint: Option<&mut ShapeHint>,
-    contacts: &mut Vec<ShapeContact>,
-    (level, scratch, found): (Level, &mut ViewScratch, &mut Vec<Candidate>),
+    out: &mut Vec<ShapeContact>,
+    (level, scratch, candidates): (Level, &mut ViewScratch, &mut Candidates),
 ) {
-    contacts.clear();
-    found.clear();
-    let own = hint.as_deref().and_then(|hint| hint.centre);
-    let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
+    out.clear();
+    let (mut points, mut bands) = ([0; MOST], [0.0; MOST]);
     if let Some(solid) = solid {
-        let starts = elements.starts(solid, elements.margin);
+        let own = hint.as_deref().and_then(|hint| hint.centre);
+        let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
+        let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
+        let Candidates { found, missed, places } = candidates;
+        found.clear();
+        missed.clear();
+        places.clear();
         let mut near = Near::new(elements, solid, false);
         near.limit(elements.margin);
-        let is_oriented = elements.placed.scan().is_oriented();
-        let inside = own.unwrap_or(solid.inside);
-        let mut search = Gather { near, hint: hint.as_deref(), inside, is_oriented, found, beside: None };
+        let starts = elements.starts(solid, elements.margin);
         // The visitor never breaks.
-        let _whole = near.descend(level, &starts, &mut search);
-        // A shape that touches has a contact.
-        if let (true, Some(beside)) = (search.found.is_empty(), search.beside) {
-            search.found.push(beside);
+        let search = &mut Gather { near, sides: &sides, found: &mut *found, missed: &mut *missed };
+        let _whole = near.descend(level, &starts, search);
+        let mut selection =
+            Selection { elements, solid, found, missed, places, taken: [None; MOST], count: 0, next: None };
+        selection.run(hint.as_deref());
+        for (n, met) in selection.taken.iter().flatten().enumerate() {
+            (points[n], bands[n]) = (met.i, met.band);
+            out.push(met.contact);
         }
-    }
-    // Behind a thin plate there is another surface, which would push the shape through.
-    if found.iter().any(|it| !it.is_behind) {
-        found.retain(|it| !it.is_behind);
-    }
-    let mut bands = [0.0; MOST];
-    let mut points = [0; MOST];
-    let known = hint.as_deref();
-    while contacts.len() < MOST {
-        let Some(next) = select(found, known, contacts) else { break };
-        let Candidate { contact, i, band, .. } = found[next];
-        (points[contacts.len()], bands[contacts.len()]) = (i, band);
-        contacts.push(contact);
-        for other in found.iter_mut() {
-            let away = Vector::from(other.contact.point) - Vector::from(contact.point);
-            other.away_sq = other.away_sq.min(away.norm_squared());
-        }
-    }
-    let is_refined = elements.detail == Detail::Witness && elements.placed.verifies();
-    if let Some(solid) = solid.filter(|_| is_refined) {
-        let inside = own.unwrap_or(solid.inside);
-        for (n, (contact, i)) in contacts.iter_mut().zip(points).enumerate() {
-            if elements.is_disc(i) && elements.placed.scan().kind(i) != PointKind::Edge {
-                refine(elements, (solid, &inside), (i, if n == 0 { SLIDES } else { 0 }), contact, scratch);
+        if elements.detail == Detail::Witness && elements.placed.verifies() {
+            for (n, (contact, i)) in out.iter_mut().zip(points).enumerate() {
+                if elements.is_disc(i) && elements.placed.scan().kind(i) != PointKind::Edge {
+                    let slides = if n == 0 { SLIDES } else { 0 };
+                    refine(elements, (solid, &sides.inside), (i, slides), contact, scratch);
+                }
             }
-        }
-        let deepest = (0..contacts.len()).max_by(|&a, &b| contacts[a].depth.total_cmp(&contacts[b].depth));
-        if let Some(deepest) = deepest.filter(|&n| contacts[n].depth > contacts[0].depth) {
-            contacts.swap(0, deepest);
-            bands.swap(0, deepest);
+            let deepest = (0..out.len()).max_by(|&a, &b| out[a].depth.total_cmp(&out[b].depth));
+            if let Some(deepest) = deepest.filter(|&n| out[n].depth > out[0].depth) {
+                out.swap(0, deepest);
+                bands.swap(0, deepest);
+            }
         }
     }
     if let Some(hint) = hint {
-        hint.number(contacts, &bands);
+        hint.number(out, &bands);
     }
 }
 
-/// Selects the deepest candidate, then those that continue contacts of the last frame, then always the
-/// one furthest from all selected ones.
-fn select(found: &[Candidate], hint: Option<&ShapeHint>, taken: &[ShapeContact]) -> Option<usize> {
-    let is_apart = |it: &Candidate| it.away_sq >= (SPREAD * it.band).powi(2);
-    let deepest = |a: &Candidate, b: &Candidate| a.contact.depth.total_cmp(&b.contact.depth);
-    let candidates = || found.iter().enumerate().filter(|(_, it)| is_apart(it));
-    if taken.is_empty() {
-        return candidates().max_by(|a, b| deepest(a.1, b.1).then(b.0.cmp(&a.0))).map(|(n, _)| n);
-    }
-    let known = hint.map(ShapeHint::contacts).into_iter().flatten();
-    for known in known {
-        let away =
-            |it: &Candidate| (Vector::from(it.contact.point) - Vector::from(known.point)).norm_squared();
-        let is_taken = |band: f64| taken.iter().any(|own| ShapeHint::continues(known, own, band));
-        let continues =
-            |it: &Candidate| ShapeHint::continues(known, &it.contact, it.band) && !is_taken(it.band);
-        let nearest =
-            candidates().filter(|(_, it)| continues(it)).min_by(|a, b| away(a.1).total_cmp(&away(b.1)));
-        if let Some((n, _)) = nearest {
-            return Some(n);
+impl Selection<'_, '_> {
+    fn run(&mut self, hint: Option<&ShapeHint>) {
+        // Behind a thin plate there is another surface, which would push the shape through.
+        let deepest = match self.deepest(true) {
+            Some(front) => {
+                self.found.retain(|it| !it.is_behind);
+                Some(front)
+            }
+            None => self.deepest(false),
+        };
+        match deepest {
+            // A shape that touches has a contact.
+            None => self.taken[0] = self.beside(),
+            Some(n) => {
+                self.take(n);
+                for known in hint.into_iter().flat_map(ShapeHint::contacts) {
+                    self.continue_from(known);
+                }
+                while self.count < MOST {
+                    let Some(n) = self.furthest() else { break };
+                    self.take(n);
+                }
+            }
         }
     }
-    let further = |a: &Candidate, b: &Candidate| a.away_sq.total_cmp(&b.away_sq);
-    let best =
-        candidates().max_by(|a, b| further(a.1, b.1).then_with(|| deepest(a.1, b.1)).then(b.0.cmp(&a.0)));
-    best.map(|(n, _)| n)
+
+    /// The deepest contact of a shape that is only beside discs.
+    fn beside(&self) -> Option<Met> {
+        let places = self.missed.iter().filter_map(|it| {
+            let (i, sign) = (it.i as usize, it.sign());
+            Some(Met::new(self.elements, i, &place_beside(self.elements, self.solid, i, sign)?))
+        });
+        places.max_by(Met::deeper)
+    }
+
+    /// Computes the place of a candidate. Removes a candidate without one and returns `None`.
+    fn place(&mut self, n: usize) -> Option<usize> {
+        let candidate = self.found[n];
+        if let Some(known) = candidate.place {
+            return Some(known as usize);
+        }
+        let i = candidate.i as usize;
+        let Some(place) = place_at(self.elements, self.solid, i, candidate.sign()) else {
+            let missed = self.remove(n);
+            self.missed.push(missed);
+            return None;
+        };
+        let number = self.places.len();
+        self.places.push(Met::new(self.elements, i, &place));
+        self.found[n].place = u32::try_from(number).ok();
+        Some(number)
+    }
+
+    /// Returns the number of the deepest place, up to [`LEVEL`], of those before or behind the surface.
+    /// Computes places as long as another one may be deeper.
+    fn deepest(&mut self, is_front: bool) -> Option<usize> {
+        let mut best: Option<usize> = None;
+        loop {
+            let unknown = self.found.iter().enumerate();
+            let unknown = unknown.filter(|(_, it)| it.place.is_none() && it.is_behind != is_front);
+            let next = unknown.max_by_key(|(_, it)| it.key(it.most));
+            let Some((n, most)) = next.map(|(n, it)| (n, f64::from(it.most))) else { return best };
+            if let Some(best) = best
+                && let Met { contact, band, .. } = &self.places[best]
+                && contact.depth + LEVEL * band >= most * self.elements.scale()
+            {
+                return Some(best);
+            }
+            if let Some(own) = self.place(n)
+                && best.is_none_or(|best| self.places[best].deeper(&self.places[own]) == Ordering::Less)
+            {
+                best = Some(own);
+            }
+        }
+    }
+
+    /// Takes the place of a candidate near a contact of the last frame, if it continues that.
+    fn continue_from(&mut self, known: &ShapeContact) {
+        let taken = || self.taken.iter().flatten();
+        if self.count == MOST || taken().any(|own| ShapeHint::continues(known, &own.contact, own.band)) {
+            return;
+        }
+        let at = Vector::from(self.elements.placed.stored_to_world().apply_inverse(known.point));
+        let mut tried = [u32::MAX; TRIES];
+        for attempt in 0..TRIES {
+            let away_sq = |it: &Candidate| (Vector::from(it.centre.map(f64::from)) - at).norm_squared();
+            let all = self.found.iter().enumerate();
+            let all = all.filter(|(_, it)| !tried.contains(&it.i));
+            let all = all.map(|(n, it)| (away_sq(it), n));
+            let nearest = all
+                .min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| self.found[a.1].i.cmp(&self.found[b.1].i)));
+            let Some((away_sq, n)) = nearest else { return };
+            tried[attempt] = self.found[n].i;
+            // A place is within its disc, whose radius is at most the local radius.
+            let band = self.elements.band(tried[attempt] as usize);
+            if away_sq.sqrt() * self.elements.scale() > 2.0 * band {
+                return;
+            }
+            if let Some(own) = self.place(n)
+                && ShapeHint::continues(known, &self.places[own].contact, band)
+                && self.is_free(own)
+            {
+                self.take(own);
+                return;
+            }
+        }
+    }
+
+    /// Returns the number of the place of the furthest disc or ball from all contacts.
+    fn furthest(&mut self) -> Option<usize> {
+        loop {
+            let all = self.found.iter().enumerate();
+            let next = self.next.take().or_else(|| Some(all.max_by_key(|(_, it)| it.key(it.away_sq))?.0));
+            let n = next?;
+            if let Some(own) = self.place(n) {
+                if self.is_free(own) {
+                    return Some(own);
+                }
+                self.remove(n);
+            }
+        }
+    }
+
+    fn remove(&mut self, n: usize) -> Candidate {
+        self.next = None;
+        self.found.swap_remove(n)
+    }
+
+    /// Returns `true` if a place is apart from all contacts.
+    fn is_free(&self, own: usize) -> bool {
+        let Met { at, i, .. } = self.places[own];
+        let least = f64::from(SPREAD * self.elements.arrays.radii[i]);
+        self.taken.iter().flatten().all(|other| (other.at - at).norm_squared() >= least * least)
+    }
+
+    /// Adds a place to the contacts. Removes the candidates that are not apart from it.
+    fn take(&mut self, own: usize) {
+        let met = self.places[own];
+        self.taken[self.count] = Some(met);
+        self.count += 1;
+        #[expect(clippy::cast_possible_truncation, reason = "as precise as the positions")]
+        let at = [0, 1, 2].map(|k| met.at[k] as f32);
+        let (mut kept, mut greatest) = (0, 0);
+        self.next = None;
+        self.found.retain_mut(|other| {
+            let [x, y, z] = [other.centre[0] - at[0], other.centre[1] - at[1], other.centre[2] - at[2]];
+            other.away_sq = other.away_sq.min(x * x + y * y + z * z);
+            let is_kept = other.away_sq >= other.apart_sq && other.i as usize != met.i;
+            if is_kept {
+                let key = other.key(other.away_sq);
+                if key > greatest {
+                    (greatest, self.next) = (key, Some(kept));
+                }
+                kept += 1;
+            }
+            is_kept
+        });
+    }
+}
+
+impl Met {
+    fn new(elements: &Elements<'_>, i: usize, place: &Place) -> Self {
+        let contact = ShapeContact {
+            point: elements.in_world(&place.point),
+            normal: elements.turned(&place.normal),
+            depth: place.depth * elements.scale(),
+            id: u64::from(elements.placed.scan().id(i).0),
+        };
+        Self { contact, at: place.point, i, band: elements.band(i) }
+    }
+
+    /// Compares the depths; of equal ones the first point is deeper.
+    fn deeper(&self, other: &Self) -> Ordering {
+        self.contact.depth.total_cmp(&other.contact.depth).then(other.i.cmp(&self.i))
+    }
 }
 
 /// Moves a contact from the tangent disc of point `i` onto the surface, with one evaluation. The deepest
@@ -198,7 +339,7 @@ fn refine(
             return;
         }
         if slides > 0
-            && let Some((point, ..)) = deepest(disc)
+            && let Some(Place { point, .. }) = deepest(disc)
             && (point - disc.centre).norm() > NEAR * radius
         {
             slides -= 1;
@@ -207,8 +348,8 @@ fn refine(
         }
         // A shape that is beside this place has no depth there.
         let least = -elements.margin.max(f64::from(THICKNESS) * radius);
-        if let Some((_, normal, depth)) =
-            deepest(FlatDisc { radius: PLACE * radius, ..disc }).filter(|found| found.2 >= least)
+        if let Some(Place { normal, depth, .. }) =
+            deepest(FlatDisc { radius: PLACE * radius, ..disc }).filter(|found| found.depth >= least)
         {
             contact.point = foot.into();
             contact.depth = depth * elements.scale();
@@ -218,167 +359,112 @@ fn refine(
     }
 }
 
-impl Gather<'_, '_> {
-    /// Adds the contact of the shape and the part of a point, if they touch.
-    fn compare(&mut self, i: usize) {
-        let Near { elements, solid, .. } = self.near;
-        if elements.is_doubtful(i) {
-            return;
-        }
-        let gap = || {
-            let (gap, thick) = elements.gap(solid, i, elements.margin);
-            (gap.distance <= solid.radius + elements.margin.max(thick)).then_some(gap)
-        };
-        let mut is_beside = false;
-        let found = match elements.element(i) {
-            Element::Ball(centre, radius) => {
-                gap().and_then(|gap| of_ball(solid, &gap, (centre, radius))).map(|it| (it, false))
-            }
-            Element::Disc(disc) => {
-                let out = self.way_out(i, &disc);
-                let is_edge = elements.placed.scan().kind(i) == PointKind::Edge;
-                let is_behind = out.dot(&(self.inside - disc.centre)) < 0.0;
-                let crosses = solid.crosses(&disc);
-                let near = if crosses { None } else { gap() };
-                let place = if crosses {
-                    Some(deepest(solid, &disc, out))
-                } else {
-                    near.as_ref().and_then(|gap| of_disc(solid, gap, &disc, (out, is_edge, elements.margin)))
-                };
-                // The part of the shape over the disc may be far above it, while another part is at the rim.
-                let least = -elements.margin.max(f64::from(THICKNESS) * disc.radius);
-                let place = place.filter(|it| it.2 >= least);
-                is_beside = place.is_none();
-                let place = place.or_else(|| {
-                    let near = if crosses { gap() } else { near };
-                    near.map(|gap| (gap.on_disc, out, solid.radius - gap.distance))
-                });
-                place.map(|it| (it, is_behind))
-            }
-        };
-        let Some(((point, normal, depth), is_behind)) = found else { return };
-        let contact = ShapeContact {
-            point: elements.in_world(&point),
-            normal: elements.turned(&normal),
-            depth: depth * elements.scale(),
-            id: u64::from(elements.placed.scan().id(i).0),
-        };
-        let found = Candidate { contact, i, band: elements.band(i), away_sq: f64::INFINITY, is_behind };
-        if !is_beside {
-            self.found.push(found);
-        } else if self.beside.is_none_or(|beside| beside.contact.depth < contact.depth) {
-            self.beside = Some(found);
-        }
-    }
+#[cfg(test)]
+mod tests {
+    use nearmiss_geometry::{PointCloud, Pose};
+    use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
+    use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
+    use rand::RngExt;
 
-    /// The normal of a disc, in the direction in which the shape moves out: outwards if the scan is
-    /// oriented, otherwise as in the last frame, or to the side of the shape's centre.
-    fn way_out(&self, i: usize, disc: &FlatDisc) -> Vector {
-        let elements = self.near.elements;
-        if self.is_oriented {
-            return disc.normal;
-        }
-        let known = self.hint.and_then(|hint| {
-            let placed = elements.placed.stored_to_world();
-            let (point, normal) = (placed.apply(disc.centre.into()), placed.rotate(disc.normal.into()));
-            let side = hint.side(&point.into(), &normal.into(), SIDE * elements.band(i))?;
-            Some(Vector::from(placed.rotate_inverse(side.into())))
-        });
-        known.unwrap_or_else(|| {
-            let side = disc.normal.dot(&(self.inside - disc.centre));
-            disc.normal * 1.0_f64.copysign(side)
-        })
-    }
-}
+    use super::*;
+    use crate::ask::options::CollideOptions;
+    use crate::pair::placed::Placed;
+    use crate::solid::plan::ShapePlan;
+    use crate::solid::shape::Shape;
 
-/// A point of the surface, the normal, and the depth of a contact.
-type Place = (Vector, Vector, f64);
-
-/// The contact with a ball: along the way from its centre to the core or, if the core contains it, to
-/// the inside of the shape.
-fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Option<Place> {
-    let way = gap.on_core - centre;
-    let normal = way.try_normalize(0.0).or_else(|| (solid.inside - centre).try_normalize(0.0));
-    let normal = normal.unwrap_or_else(Vector::z);
-    let inside = if way == Vector::zeros() { -normal.dot(&(solid.support(&-normal) - centre)) } else { 0.0 };
-    let depth = solid.radius + radius - way.norm() + inside;
-    Some((centre + normal * radius, normal, depth)).filter(|it| it.2.is_finite())
-}
-
-/// The contact with a disc: the deepest place of the shape over the disc.
-fn of_disc(
-    solid: &Solid<'_>,
-    gap: &Gap,
-    disc: &FlatDisc,
-    (out, is_edge, margin): (Vector, bool, f64),
-) -> Option<Place> {
-    let way = gap.on_core - gap.on_disc;
-    let (length, height) = (way.norm(), out.dot(&way));
-    // The core is before the disc.
-    if height > 0.0 && length > PRECISION * disc.radius {
-        let beside_sq = (way - out * height).norm_squared();
-        if beside_sq <= (PRECISION * length).powi(2) {
-            return Some((gap.on_disc, out, solid.radius - height));
-        }
-        if is_edge {
-            return Some((gap.on_disc, way / length, solid.radius - length));
-        }
-        // The sphere about the nearest point of the core reaches this far below the rim.
-        let below = solid.radius * solid.radius - beside_sq;
-        let depth = if below >= 0.0 { below.sqrt() - height } else { f64::NEG_INFINITY };
-        return (depth >= -margin).then_some((gap.on_disc, out, depth));
-    }
-    Some(deepest(solid, disc, out))
-}
-
-/// The deepest place of the shape over a disc that crosses its core, or that it is behind of. The disc
-/// moves up from below the shape until it touches the core.
-fn deepest(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Place {
-    let lowest = solid.support(&-out);
-    let mut depth = -out.dot(&(lowest - disc.centre));
-    let across = lowest - disc.centre + out * depth;
-    if across.norm_squared() <= disc.radius * disc.radius {
-        return (disc.centre + across, out, depth + solid.radius);
-    }
-    if let Some(lowest) = solid.lowest_over(disc, &out) {
-        let height = out.dot(&(lowest - disc.centre));
-        return (lowest - out * height, out, solid.radius - height);
-    }
-    let mut place = disc.centre;
-    for _ in 0..ROUNDS {
-        let below = FlatDisc { centre: disc.centre - out * depth, ..*disc };
-        let gap = solid.gap(&below, f64::INFINITY);
-        place = gap.on_disc + out * depth;
-        let rise = out.dot(&(gap.on_core - gap.on_disc));
-        if gap.distance <= PRECISION * disc.radius || rise <= PRECISION * gap.distance {
-            break;
-        }
-        // No place of the core is below the plane through the nearest point, across the way to it.
-        depth -= gap.distance * gap.distance / rise;
-    }
-    (place, out, depth + solid.radius)
-}
-
-impl PlaceVisitor for Gather<'_, '_> {
-    #[inline(always)]
-    fn most_sq(&self) -> f32 {
-        self.near.most_sq
-    }
-
-    #[inline(always)]
-    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
-        self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
-    }
-
-    #[inline(always)]
-    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
-        let elements = self.near.elements;
-        for (block, first, count) in elements.arrays.leaves.blocks(number) {
-            let gaps = elements.leaf_gaps(simd, &self.near.lane_box, (number, block, first, count));
-            for lane in Bits(Elements::within(simd, (&gaps.elements, count), self.near.most)) {
-                self.compare(first + lane);
+    /// The places of all discs and balls, before and behind the surface.
+    fn all_places(elements: &Elements<'_>, solid: &Solid<'_>) -> [Vec<Met>; 2] {
+        let sides = Sides::new(elements, solid.inside, None);
+        let mut all = [Vec::new(), Vec::new()];
+        for i in 0..elements.placed.scan().len() {
+            let (normal, radius) = (elements.normal(i), f64::from(elements.arrays.discs.get(i)));
+            let disc = FlatDisc { centre: elements.position(i), normal, radius };
+            let (sign, is_behind) =
+                if elements.is_disc(i) { sides.of(&disc, elements.band(i)) } else { (1.0, false) };
+            if let Some(place) = place_at(elements, solid, i, sign) {
+                all[usize::from(is_behind)].push(Met::new(elements, i, &place));
             }
         }
-        ControlFlow::Continue(())
+        all
+    }
+
+    #[test]
+    fn contacts_are_those_of_a_selection_among_all_places() {
+        let mesh = dragon_mesh(Dragon::Points5k).unwrap();
+        let cloud = PointCloud::from_positions(mesh.vertices()).unwrap();
+        let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let r = scan.sampling_radius();
+        let rng = &mut rng(77);
+        let (mut full, mut computed, mut possible) = (0, 0, 0);
+        for round in 0..1200 {
+            let options = CollideOptions::estimated().with_detail(Detail::Verdict);
+            let options = options.with_margin([0.0, 0.3 * r][round % 2]);
+            let plan = ShapePlan::new(&options, &scan).unwrap();
+            let pose = if round % 3 == 0 { rotation(rng).with_scale(3.0) } else { Pose::IDENTITY };
+            let elements = Elements::new(Placed::new(&scan, &pose), &plan);
+            let size = r * pose.scale();
+            let i = rng.random_range(0..scan.len());
+            let at = pose.apply(scan.arrays().position(i).map(f64::from));
+            let (off, along) = (point_in(rng, 1.5 * size), unit_vector(rng));
+            let centre = [0, 1, 2].map(|k| at[k] + off[k]);
+            let end = [0, 1, 2].map(|k| centre[k] + 4.0 * size * along[k]);
+            let half = [2.0, 1.0, 0.5].map(|h| h * size);
+            let body = rotation(rng).with_translation(centre);
+            let shape = match round % 5 {
+                0 => Shape::Sphere { centre, radius: size },
+                1 => Shape::Capsule { ends: [centre, end], radius: 0.7 * size },
+                2 => Shape::Box { pose: body, half, radius: 0.0 },
+                3 => Shape::Box { pose: body, half, radius: 0.4 * size },
+                _ => Shape::Cylinder { pose: body, half_height: size, radius: size, rounding: 0.0 },
+            };
+            let solid = Solid::new(&shape, elements.placed.stored_to_world()).unwrap();
+            let (mut out, mut candidates) = (Vec::new(), Candidates::default());
+            let working = (Level::new(), &mut ViewScratch::default(), &mut candidates);
+            contacts(&elements, Some(&solid), None, &mut out, working);
+            let [front, behind] = all_places(&elements, &solid);
+            let all = if front.is_empty() { behind } else { front };
+            if all.is_empty() {
+                assert!(out.len() <= 1, "round {round}: {out:?}");
+                continue;
+            }
+            let deepest = all.iter().max_by(|a, b| a.deeper(b)).unwrap();
+            let least = deepest.contact.depth - LEVEL * deepest.band;
+            assert!(out[0].depth >= least, "round {round}: {:?}, deepest {deepest:?}", out[0]);
+            let ids: Vec<u64> = all.iter().map(|met| met.contact.id).collect();
+            let own = |contact: &ShapeContact| {
+                let n = ids.iter().position(|&id| id == contact.id);
+                let n = n.unwrap_or_else(|| panic!("round {round}: {contact:?} is no place"));
+                assert_eq!(all[n].contact, *contact, "round {round}");
+                all[n]
+            };
+            // Boxes of nodes contain discs without their thickness.
+            let is_near = |met: &&Met| {
+                let gap = elements.gap(&solid, met.i, elements.margin).0;
+                gap.distance <= solid.radius + elements.margin
+            };
+            // Each further one is the disc or ball furthest from those before.
+            let taken: Vec<Met> = out.iter().map(own).collect();
+            for n in 1..=out.len().min(MOST - 1) {
+                let before = &taken[..n];
+                let away = |x: Vector| before.iter().map(|it| (x - it.at).norm()).fold(f64::MAX, f64::min);
+                let centre_of = |met: &Met| elements.position(met.i);
+                let reach = taken.get(n).map_or(0.0, |next| away(centre_of(next)));
+                for other in all.iter().filter(is_near) {
+                    let least = f64::from(SPREAD * elements.arrays.radii[other.i]);
+                    let is_free = away(other.at).min(away(centre_of(other))) > least * (1.0 + 1e-4);
+                    let is_taken = taken.iter().any(|it| it.i == other.i);
+                    assert!(
+                        is_taken || !is_free || away(centre_of(other)) <= reach * (1.0 + 1e-4),
+                        "round {round}: {:?} is further than contact {n}, {other:?}",
+                        away(centre_of(other))
+                    );
+                }
+            }
+            full += usize::from(out.len() == MOST);
+            computed += candidates.places.len();
+            possible += all.len();
+        }
+        println!("{full} full, {computed} of {possible}");
     }
 }

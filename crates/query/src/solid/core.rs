@@ -155,6 +155,11 @@ impl<'a> Solid<'a> {
         matches!(self.core, Core::Point)
     }
 
+    /// Returns `true` if the core is a point or a segment along the first axis.
+    pub(crate) fn is_segment(&self) -> bool {
+        matches!(self.core, Core::Point | Core::Segment)
+    }
+
     fn ends(&self) -> [Vector; 2] {
         let along = self.axes[0] * self.half.x;
         [self.centre - along, self.centre + along]
@@ -179,46 +184,19 @@ impl<'a> Solid<'a> {
         Some(self.centre + edge * if out.dot(&edge) < 0.0 { high } else { low })
     }
 
-    /// The lowest place of a box over a disc that its lowest corner is beside of: above the rim, on an
-    /// edge, or where a face that looks down is lowest.
+    /// The lowest place of a box over a disc: where a face that looks down is lowest, or on an edge.
     fn lowest_of_box(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
         /// Slopes below this are level.
         const LEVEL: f64 = 1e-12;
-        let mut best: Option<(f64, Vector)> = None;
-        // A height over the centre of the box, and the place in half edges from there.
-        let mut offer = |height: f64, place: Vector| {
-            if best.is_none_or(|(least, _)| height < least) {
-                best = Some((height, place));
-            }
-        };
         let across = |v: Vector| v - out * out.dot(&v);
         let rises = self.axes.map(|axis| axis.dot(out));
         let away = across(self.centre - disc.centre);
-        let edges = [0, 1, 2].map(|k| (self.axes[k] - out * rises[k]) * self.half[k]);
-        let along = edges.map(|edge| away.dot(&edge));
-        let product = edges.map(|edge| edges.map(|other| edge.dot(&other)));
-        let beyond = away.norm_squared() - disc.radius * disc.radius;
+        // The face across axis k that looks down, at the place of the rim where it is lowest. The box is
+        // above the plane of the face, so no other place is lower.
         for k in 0..3 {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            for [a, b] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
-                // Between two faces that look up.
-                if a * rises[i] > 0.0 && b * rises[j] > 0.0 {
-                    continue;
-                }
-                // The square of the distance from the axis, less that of the radius, along the edge.
-                let sides = a * along[i] + b * along[j] + a * b * product[i][j];
-                let c = beyond + product[i][i] + product[j][j] + 2.0 * sides;
-                let h = along[k] + a * product[i][k] + b * product[j][k];
-                let Some([low, high]) = least_range(product[k][k], h, c) else { continue };
-                let mut place = Vector::zeros();
-                (place[i], place[j], place[k]) = (a, b, if rises[k] < 0.0 { high } else { low });
-                let height = (0..3).map(|m| rises[m] * self.half[m] * place[m]).sum();
-                offer(height, place);
-            }
             if rises[k].abs() <= LEVEL {
                 continue;
             }
-            // The face across axis k that looks down, at the place of the rim where it is lowest.
             let side = -1.0_f64.copysign(rises[k]);
             let downhill = across(self.axes[k] * side);
             let slope = downhill.norm();
@@ -228,26 +206,52 @@ impl<'a> Solid<'a> {
             let height = (self.half[k] + side * self.axes[k].dot(&beside)) / -rises[k].abs();
             let from = out * height - beside;
             let is_on = |m: usize| self.axes[m].dot(&from).abs() <= self.half[m];
-            if is_on(i) && is_on(j) {
-                let in_halves =
-                    |m: usize| if self.half[m] > 0.0 { self.axes[m].dot(&from) / self.half[m] } else { 0.0 };
-                offer(height, Vector::from([0, 1, 2].map(in_halves)));
+            if is_on((k + 1) % 3) && is_on((k + 2) % 3) {
+                return Some(self.centre + from);
+            }
+        }
+        self.lowest_of_edges(disc, (&away, &rises), &self.axes.map(across))
+    }
+
+    /// The lowest place over a disc on an edge of a box. `away` is across the disc from its centre to that
+    /// of the box, `rises` are the slopes of the axes, and `across` their parts across the disc.
+    fn lowest_of_edges(
+        &self,
+        disc: &FlatDisc,
+        (away, rises): (&Vector, &[f64; 3]),
+        across: &[Vector; 3],
+    ) -> Option<Vector> {
+        // A height over the centre of the box, and the place in half edges from there.
+        let mut best: Option<(f64, Vector)> = None;
+        let edges = [0, 1, 2].map(|k| across[k] * self.half[k]);
+        let climbs = [0, 1, 2].map(|k| rises[k] * self.half[k]);
+        let along = edges.map(|edge| away.dot(&edge));
+        let product = edges.map(|edge| edges.map(|other| edge.dot(&other)));
+        let beyond = away.norm_squared() - disc.radius * disc.radius;
+        for k in 0..3 {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            // Not between two faces that look up.
+            let [low_i, low_j] = [rises[i], rises[j]].map(|rise| -1.0_f64.copysign(rise));
+            for [a, b] in [[low_i, low_j], [-low_i, low_j], [low_i, -low_j]] {
+                let middle = climbs[i] * a + climbs[j] * b;
+                if best.is_some_and(|(least, _)| middle - climbs[k].abs() >= least) {
+                    continue;
+                }
+                // The square of the distance from the axis, less that of the radius, along the edge.
+                let sides = a * along[i] + b * along[j] + a * b * product[i][j];
+                let c = beyond + product[i][i] + product[j][j] + 2.0 * sides;
+                let h = along[k] + a * product[i][k] + b * product[j][k];
+                let Some([low, high]) = least_range(product[k][k], h, c) else { continue };
+                let mut place = Vector::zeros();
+                (place[i], place[j], place[k]) = (a, b, if rises[k] < 0.0 { high } else { low });
+                let height = middle + climbs[k] * place[k];
+                if best.is_none_or(|(least, _)| height < least) {
+                    best = Some((height, place));
+                }
             }
         }
         let (_, place) = best?;
         Some((0..3).fold(self.centre, |x, k| x + self.axes[k] * (self.half[k] * place[k])))
-    }
-
-    /// Returns `true` if a core that is a segment or a box certainly crosses a disc.
-    pub(crate) fn crosses(&self, disc: &FlatDisc) -> bool {
-        let reach: f64 = (0..3).map(|k| (self.axes[k].dot(&disc.normal) * self.half[k]).abs()).sum();
-        if disc.normal.dot(&(self.centre - disc.centre)).abs() > reach {
-            return false;
-        }
-        let side = |out: Vector| {
-            self.lowest_over(disc, &out).is_some_and(|lowest| out.dot(&(lowest - disc.centre)) <= 0.0)
-        };
-        side(disc.normal) && side(-disc.normal)
     }
 
     /// The point of the core furthest along `d`.

@@ -12,7 +12,7 @@ use crate::ask::options::{Detail, Semantics};
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::pair::placed::Placed;
 use crate::solid::core::{Gap, Solid};
-use crate::solid::lanes::LaneBox;
+use crate::solid::lanes::{Distances, LaneBox};
 use crate::solid::plan::ShapePlan;
 
 type Vector = Vector3<f64>;
@@ -74,6 +74,28 @@ pub(crate) struct Parts<S: Simd> {
     /// The radii of the cells of points on sheets.
     pub(crate) cells: f32x16<S>,
     pub(crate) discs: mask32x16<S>,
+}
+
+/// Distances of a core from the points of a block of a leaf and their planes, and the errors of these.
+pub(crate) struct Measured<S: Simd> {
+    pub(crate) distances: Distances<S>,
+    /// The error of the distance from a disc, or of a height.
+    pub(crate) tilt: f32x16<S>,
+    /// The error of the distance from a point.
+    off: f32,
+}
+
+impl<S: Simd> Measured<S> {
+    #[inline(always)]
+    pub(crate) fn new(simd: S, lane_box: &LaneBox, block: &LeafBlock) -> Self {
+        // Positions are off by a step, and normals by less than a step in each component.
+        let [x, y, z] = block.half;
+        let step = 2.0 * (x * x + y * y + z * z).sqrt() / STEPS;
+        let distances = lane_box.of_points(simd, &block.positions(simd), &block.normals(simd));
+        let off = 2.0 * step + lane_box.slack;
+        let tilt = (distances.from_point + lane_box.reach()) * (2.0 / STEPS) + off;
+        Self { distances, tilt, off }
+    }
 }
 
 impl<'a> Elements<'a> {
@@ -228,11 +250,7 @@ impl<'a> Elements<'a> {
         let parts = self.parts(simd, leaf, (block, first, count), has_cells);
         let used = mask32x16::from_bitmask(simd, (1_u64 << count) - 1);
         let none = f32x16::splat(simd, f32::INFINITY);
-        // Positions are off by a step, and normals by less than a step in each component.
-        let [x, y, z] = block.half;
-        let step = 2.0 * (x * x + y * y + z * z).sqrt() / STEPS;
-        let distances = lane_box.of_points(simd, &block.positions(simd), &block.normals(simd));
-        let tilt = (distances.from_point + lane_box.reach()) * (2.0 / STEPS) + (2.0 * step + lane_box.slack);
+        let Measured { distances, tilt, off } = Measured::new(simd, lane_box, block);
         let elements = distances.from(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
         let cells = if has_cells {
             distances.from(simd, parts.reaches, parts.slabs, parts.discs) - tilt
@@ -242,7 +260,7 @@ impl<'a> Elements<'a> {
         LeafGaps {
             elements: used.select(elements, none).to_array(),
             cells: used.select(cells, none).to_array(),
-            points: (distances.from_point + (2.0 * step + lane_box.slack)).to_array(),
+            points: (distances.from_point + off).to_array(),
         }
     }
 

@@ -45,20 +45,6 @@ impl ShapeHint {
         self.contacts.iter().flatten()
     }
 
-    /// Returns `normal` or its opposite: the direction in which the shape moved out at the nearest
-    /// contact of the last frame, if one is within `reach`.
-    pub(crate) fn side(
-        &self,
-        point: &Vector3<f64>,
-        normal: &Vector3<f64>,
-        reach: f64,
-    ) -> Option<Vector3<f64>> {
-        let away = |contact: &ShapeContact| (Vector3::from(contact.point) - point).norm_squared();
-        let nearest = self.contacts().min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        let along = Vector3::from(nearest.normal).dot(normal);
-        (away(nearest) <= reach * reach && along != 0.0).then(|| normal * 1.0_f64.copysign(along))
-    }
-
     /// Returns `true` if a contact continues one of the last frame. `band` is its local radius.
     pub(crate) fn continues(known: &ShapeContact, contact: &ShapeContact, band: f64) -> bool {
         let away = Vector3::from(known.point) - Vector3::from(contact.point);

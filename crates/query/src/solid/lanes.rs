@@ -21,9 +21,11 @@ const FARTHEST: f64 = 1e15;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LaneBox {
     pub(crate) centre: [f32; 3],
-    axes: [[f32; 3]; 3],
-    half: [f32; 3],
+    pub(crate) axes: [[f32; 3]; 3],
+    pub(crate) half: [f32; 3],
     is_point: bool,
+    /// `true` if the core is a point or a segment along the first axis.
+    pub(crate) is_segment: bool,
     /// `false` if coordinates are out of the range of single precision: then nothing is pruned.
     pub(crate) is_near: bool,
     /// The error of a distance.
@@ -41,6 +43,7 @@ impl LaneBox {
             axes: solid.axes.map(|axis| single(axis.into())),
             half: single(solid.half.into()),
             is_point: solid.is_point(),
+            is_segment: solid.is_segment(),
             is_near: far < FARTHEST,
             slack: (ROUNDING * far) as f32,
         }

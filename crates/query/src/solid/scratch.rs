@@ -2,12 +2,12 @@
 
 use crate::solid::answer::ShapeContact;
 use crate::solid::cast::Crossing;
-use crate::solid::contacts::Candidate;
+use crate::solid::contacts::Candidates;
 
 /// Reusable memory; never influences an answer.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SolidScratch {
-    pub(crate) candidates: Vec<Candidate>,
+    pub(crate) candidates: Candidates,
     pub(crate) crossings: Vec<Crossing>,
     pub(crate) contacts: Vec<ShapeContact>,
 }

@@ -1,0 +1,211 @@
+//! Upper bounds on the depths of a shape over the discs of a leaf, sixteen at a time, in single
+//! precision.
+//!
+//! The depth over a disc is how far the shape reaches below the plane of the disc, within the cylinder
+//! over it. Three bounds hold: the lowest place of the whole shape; the planes of the faces of its box,
+//! where these are over the disc; and, for a segment with a radius, the part of the radius that is left
+//! at the distance of the disc from the segment's shadow on its plane. On a surface the bounds are tight
+//! up to the bend of the surface within a disc, so few depths have to be computed.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
+use nearmiss_lanes::wide::{Vectors, along, product, squared};
+
+use crate::solid::lanes::LaneBox;
+
+/// The cosine below which the plane of a face is too steep to bound the depth over a disc across it.
+const STEEP: f32 = 0.1;
+
+/// The discs of sixteen points, relative to the centre of a shape's box.
+#[derive(Clone, Copy)]
+pub(crate) struct LaneDiscs<S: Simd> {
+    pub(crate) centres: Vectors<S>,
+    /// Unit normals, on the side to which the shape moves out.
+    pub(crate) out: Vectors<S>,
+    pub(crate) radii: f32x16<S>,
+}
+
+impl LaneBox {
+    /// Upper bounds on the depths of a shape with this box and this radius over discs, up to rounding.
+    /// Negative infinity where no part of the shape is over the disc. O(1).
+    #[inline(always)]
+    pub(crate) fn depths<S: Simd>(&self, simd: S, discs: &LaneDiscs<S>, radius: f32) -> f32x16<S> {
+        if !self.is_near {
+            return f32x16::splat(simd, f32::INFINITY);
+        }
+        // Not a closure, which would be compiled without the vector instructions.
+        let [x, y, z] = self.axes;
+        let rises = [along(discs.out, x), along(discs.out, y), along(discs.out, z)];
+        let mut reach = f32x16::splat(simd, 0.0);
+        for k in 0..3 {
+            reach += rises[k].abs() * self.half[k];
+        }
+        // The height of the disc's plane over the centre of the box.
+        let height = product(discs.centres, discs.out);
+        if self.is_segment {
+            self.over_segment(simd, discs, (rises[0], reach, height), radius)
+        } else {
+            self.over_box(simd, discs, (rises, reach, height), radius)
+        }
+    }
+
+    #[inline(always)]
+    fn over_box<S: Simd>(
+        &self,
+        simd: S,
+        discs: &LaneDiscs<S>,
+        (rises, reach, height): ([f32x16<S>; 3], f32x16<S>, f32x16<S>),
+        radius: f32,
+    ) -> f32x16<S> {
+        let (zero, none) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, f32::INFINITY));
+        let mut most = reach + height + radius;
+        for k in 0..3 {
+            let (rise, at) = (rises[k], along(discs.centres, self.axes[k]));
+            let cosine = rise.abs();
+            let is_steep: mask32x16<S> = cosine.simd_lt(STEEP);
+            // The face that looks down.
+            let is_upper: mask32x16<S> = rise.simd_gt(zero);
+            let beyond = is_upper.select(at, -at) + (self.half[k] + radius);
+            let slope = (1.0 - rise * rise).max(zero).sqrt();
+            // Negative if the disc is outside the face.
+            let within = beyond + discs.radii * slope;
+            let is_outside: mask32x16<S> = within.simd_lt(zero);
+            let by_face = within / cosine.max(STEEP);
+            most = most.min((is_steep & !is_outside).select(none, by_face));
+        }
+        most
+    }
+
+    #[inline(always)]
+    fn over_segment<S: Simd>(
+        &self,
+        simd: S,
+        discs: &LaneDiscs<S>,
+        (rise, reach, height): (f32x16<S>, f32x16<S>, f32x16<S>),
+        radius: f32,
+    ) -> f32x16<S> {
+        let zero = f32x16::splat(simd, 0.0);
+        let least = f32x16::splat(simd, f32::NEG_INFINITY);
+        let at = along(discs.centres, self.axes[0]);
+        // The length of the axis' shadow, and the disc's places along it and across.
+        let shadow = (1.0 - rise * rise).max(zero).sqrt();
+        let across_sq = (squared(discs.centres) - height * height).max(zero);
+        let is_steep: mask32x16<S> = shadow.simd_lt(STEEP);
+        let place = (at - height * rise) / shadow.max(STEEP);
+        let beside = (across_sq - place * place).max(zero).sqrt();
+        let along_it = is_steep.select(across_sq.sqrt(), place.abs());
+        let beside = is_steep.select(zero, (beside - discs.radii).max(zero));
+        let beyond = (along_it - discs.radii - shadow * self.half[0]).max(zero);
+        // What is left of the radius that far from the shadow.
+        let across_left_sq = radius * radius - beside * beside;
+        let left_sq = across_left_sq - beyond * beyond;
+        let is_over: mask32x16<S> = left_sq.simd_ge(zero);
+        let by_end = reach + height + left_sq.max(zero).sqrt();
+        // Seen along its axis, the shape is a circle.
+        let left = across_left_sq.max(zero).sqrt();
+        let by_side = (left * shadow + height - at * rise + discs.radii * rise.abs() * shadow)
+            / (shadow * shadow).max(STEEP * STEEP);
+        let by_side = is_steep.select(by_end, by_side);
+        is_over.select(by_end.min(by_side), least)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::dispatch;
+    use nearmiss_geometry::Pose;
+    use nearmiss_geometry::nalgebra::Vector3;
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
+    use nearmiss_testdata::instructions::levels;
+    use rand::RngExt;
+
+    use super::*;
+    use crate::solid::core::Solid;
+    use crate::solid::shape::Shape;
+
+    type Vector = Vector3<f64>;
+
+    /// The greatest t for which `x` − t `out` is in the shape: the distance from the core is convex along
+    /// the line.
+    fn depth_below(solid: &Solid<'_>, x: Vector, out: Vector) -> Option<f64> {
+        let apart = |t: f64| solid.distance(&(x - out * t)) - solid.radius;
+        let (mut low, mut high) = (-10.0, 10.0);
+        for _ in 0..100 {
+            let [p, q] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+            if apart(p) < apart(q) { high = q } else { low = p }
+        }
+        let inside = 0.5 * (low + high);
+        if apart(inside) > 1e-9 {
+            return None;
+        }
+        let (mut low, mut high) = (inside, 10.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if apart(middle) > 1e-9 { high = middle } else { low = middle }
+        }
+        Some(low)
+    }
+
+    /// The greatest depth over places of a disc.
+    fn sampled(solid: &Solid<'_>, centre: Vector, out: Vector, radius: f64) -> Option<f64> {
+        let across = out.cross(&Vector::ith(out.iamin(), 1.0)).normalize();
+        let other = out.cross(&across);
+        let places = (0..=4).flat_map(|ring| (0..16).map(move |turn| (ring, turn)));
+        let depths = places.filter_map(|(ring, turn)| {
+            let (angle, r) = (std::f64::consts::TAU * f64::from(turn) / 16.0, radius * f64::from(ring) / 4.0);
+            depth_below(solid, centre + (across * angle.cos() + other * angle.sin()) * r, out)
+        });
+        depths.reduce(f64::max)
+    }
+
+    #[test]
+    fn depths_are_bounded_closely_by_any_instructions() {
+        let rng = &mut rng(5);
+        let (mut over, mut loose) = ([0; 5], [0.0; 5]);
+        for round in 0..200 {
+            let pose = rotation(rng).with_translation(point_in(rng, 1.0));
+            let end = [0, 1, 2].map(|k| pose.translation()[k] + point_in(rng, 1.0)[k]);
+            let kind = round % 5;
+            let shape = match kind {
+                0 => Shape::Sphere { centre: pose.translation(), radius: 0.4 },
+                1 => Shape::Capsule { ends: [pose.translation(), end], radius: 0.3 },
+                2 => Shape::Box { pose, half: [0.5, 0.3, 0.1], radius: 0.0 },
+                3 => Shape::Box { pose, half: [0.3, 0.3, 0.05], radius: 0.1 },
+                _ => Shape::Cylinder { pose, half_height: 0.3, radius: 0.2, rounding: 0.0 },
+            };
+            let solid = Solid::new(&shape, &Pose::IDENTITY).unwrap();
+            let lane_box = LaneBox::new(&solid, 2.0);
+            let discs: [(Vector, Vector, f64); 16] = [(); 16].map(|()| {
+                let out = Vector::from(unit_vector(rng));
+                // Most discs are near the lowest place of the shape.
+                let near = solid.support(&-out) - out * solid.radius;
+                (near + Vector::from(point_in(rng, 0.5)), out, rng.random_range(0.02..0.2))
+            });
+            for level in levels() {
+                let found = dispatch!(level, simd => {
+                    let each = |of: &dyn Fn(&(Vector, Vector, f64)) -> f64| {
+                        #[expect(clippy::cast_possible_truncation, reason = "single precision")]
+                        f32x16::load_array(simd, discs.each_ref().map(|disc| of(disc) as f32))
+                    };
+                    let centres = [0, 1, 2].map(|k| each(&|disc| disc.0[k] - solid.centre[k]));
+                    let out = [0, 1, 2].map(|k| each(&|disc| disc.1[k]));
+                    let discs = LaneDiscs { centres, out, radii: each(&|disc| disc.2) };
+                    #[expect(clippy::cast_possible_truncation, reason = "single precision")]
+                    lane_box.depths(simd, &discs, solid.radius as f32).to_array()
+                });
+                for (&(centre, out, radius), bound) in discs.iter().zip(found) {
+                    let Some(depth) = sampled(&solid, centre, out, radius) else { continue };
+                    let bound = f64::from(bound);
+                    assert!(
+                        bound >= depth - 1e-5,
+                        "{shape:?}: bound {bound} of depth {depth}, {centre} {out} {radius}"
+                    );
+                    over[kind] += 1;
+                    loose[kind] += (bound - depth) / radius;
+                }
+            }
+        }
+        let mean: Vec<f64> = loose.iter().zip(over).map(|(sum, count)| sum / f64::from(count)).collect();
+        println!("{mean:?} {over:?}");
+    }
+}

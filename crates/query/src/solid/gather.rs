@@ -1,0 +1,179 @@
+//! The discs and balls that a shape may touch, each with an upper bound on the depth there.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
+use nearmiss_hierarchy::{LeafBlock, PlaceVisitor, Siblings, THICKNESS};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{Bits, along, bits, product};
+
+use crate::ask::options::Semantics;
+use crate::solid::depths::LaneDiscs;
+use crate::solid::descent::Near;
+use crate::solid::elements::{Element, Elements, Measured};
+use crate::solid::sides::Sides;
+
+/// Two contacts of a manifold are at least this far apart, in local radii.
+pub(crate) const SPREAD: f32 = 0.5;
+
+/// The error of a component of a stored normal.
+const NORMAL: f32 = 1e-4;
+
+/// A disc or ball that the shape may touch.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Candidate {
+    /// Its centre, in the stored frame.
+    pub(crate) centre: [f32; 3],
+    /// The index of the point.
+    pub(crate) i: u32,
+    /// An upper bound on the depth, in the stored frame.
+    pub(crate) most: f32,
+    /// `true` if the normal of the disc is opposite to the direction in which the shape moves out.
+    pub(crate) is_turned: bool,
+    /// `true` if the shape is behind the surface.
+    pub(crate) is_behind: bool,
+    /// The number of the place that was computed.
+    pub(crate) place: Option<u32>,
+    /// The squared distance from the nearest contact that was selected.
+    pub(crate) away_sq: f32,
+    /// The least of these distances at which it gives another contact.
+    pub(crate) apart_sq: f32,
+}
+
+impl Candidate {
+    /// A key that orders candidates by this number, and equal ones by their points, the first one last.
+    pub(crate) fn key(&self, number: f32) -> u64 {
+        // The bits of floats in their order.
+        let bits = number.to_bits();
+        let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+        u64::from(ordered) << 32 | u64::from(!self.i)
+    }
+
+    /// The sign of the normal of the disc in the direction in which the shape moves out.
+    pub(crate) fn sign(&self) -> f64 {
+        if self.is_turned { -1.0 } else { 1.0 }
+    }
+}
+
+/// The search for candidates.
+pub(crate) struct Gather<'s, 'a> {
+    pub(crate) near: Near<'s, 'a>,
+    pub(crate) sides: &'s Sides,
+    pub(crate) found: &'s mut Vec<Candidate>,
+    /// Candidates that no part of the shape within the margin is over.
+    pub(crate) missed: &'s mut Vec<Candidate>,
+}
+
+/// The points of a block of a leaf that may touch, and on which side of them the shape is, as bits.
+struct Turned {
+    lanes: u32,
+    /// The lanes whose disc is turned, and those that the shape is behind of.
+    turned: u32,
+    behind: u32,
+    /// The lanes in which single precision does not tell the side.
+    unsure: u32,
+}
+
+impl Turned {
+    /// Decides in double precision where it has to.
+    fn settle(&mut self, elements: &Elements<'_>, sides: &Sides, first: usize) {
+        if elements.semantics == Semantics::Surface {
+            for lane in Bits(self.lanes).filter(|lane| elements.is_doubtful(first + lane)) {
+                self.lanes &= !(1 << lane);
+            }
+        }
+        let open = if sides.has_contacts() { self.lanes } else { self.lanes & self.unsure };
+        for lane in Bits(open) {
+            let i = first + lane;
+            if let Element::Disc(disc) = elements.element(i) {
+                let (sign, is_behind) = sides.of(&disc, f64::from(elements.arrays.radii[i]));
+                let set = |bits: u32, is_set: bool| bits & !(1 << lane) | u32::from(is_set) << lane;
+                (self.turned, self.behind) = (set(self.turned, sign < 0.0), set(self.behind, is_behind));
+            }
+        }
+    }
+}
+
+impl Gather<'_, '_> {
+    #[inline(always)]
+    fn block<S: Simd>(&mut self, simd: S, leaf: usize, part: (&LeafBlock, usize, usize)) {
+        let (block, first, count) = part;
+        let Near { elements, solid, lane_box, most, .. } = self.near;
+        let parts = elements.parts(simd, leaf, part, false);
+        let Measured { distances, tilt, .. } = Measured::new(simd, &lane_box, block);
+        let gaps = distances.from(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
+        let lanes = Elements::within(simd, (&gaps.to_array(), count), most);
+        if lanes == 0 {
+            return;
+        }
+        let (positions, normals) = (block.positions(simd), block.normals(simd));
+        let [cx, cy, cz] = lane_box.centre;
+        let d = [positions[0] - cx, positions[1] - cy, positions[2] - cz];
+        #[expect(clippy::cast_possible_truncation, reason = "near the plane the side is decided in double")]
+        let (inside, radius) = (
+            [0, 1, 2].map(|k| (self.sides.inside[k] - solid.centre[k]) as f32),
+            (solid.radius as f32).next_up(),
+        );
+        let heights = along(normals, inside) - product(d, normals);
+        let none = f32x16::splat(simd, f32::INFINITY);
+        // The point that tells the side may be far outside the shape. A ball has no sides.
+        let doubt = tilt + NORMAL * inside.iter().map(|x| x.abs()).sum::<f32>();
+        let discs = lanes & bits(parts.discs);
+        let (is_sure, is_below): (mask32x16<S>, mask32x16<S>) =
+            (heights.abs().simd_gt(doubt), heights.simd_lt(0.0));
+        let (unsure, below) = (discs & !bits(is_sure), discs & bits(is_below));
+        let (turned, behind) = if self.sides.is_oriented { (0, below) } else { (below, 0) };
+        let mut turned = Turned { lanes, turned, behind, unsure };
+        turned.settle(elements, self.sides, first);
+        let is_turned = mask32x16::from_bitmask(simd, u64::from(turned.turned));
+        let [x, y, z] = normals;
+        let out = [is_turned.select(-x, x), is_turned.select(-y, y), is_turned.select(-z, z)];
+        let of_discs =
+            lane_box.depths(simd, &LaneDiscs { centres: d, out, radii: parts.radii }, radius) + tilt;
+        let is_in: mask32x16<S> = distances.from_point.simd_le(tilt);
+        let of_balls = is_in.select(none, parts.radii + radius - distances.from_point + tilt);
+        let depths = parts.discs.select(of_discs, of_balls).to_array();
+        // The least depth of a contact.
+        #[expect(clippy::cast_possible_truncation, reason = "depths are rounded more")]
+        let least = -(parts.radii * THICKNESS).max(elements.margin as f32);
+        let is_over: mask32x16<S> = parts.discs.select(of_discs, of_balls).simd_ge(least);
+        let over = bits(is_over) | turned.unsure;
+        for lane in Bits(turned.lanes) {
+            let (i, bit) = (first + lane, 1 << lane);
+            let list = if over & bit == 0 { &mut *self.missed } else { &mut *self.found };
+            list.push(Candidate {
+                centre: elements.arrays.position(i),
+                i: id32(i),
+                most: if turned.unsure & bit == 0 { depths[lane] } else { f32::INFINITY },
+                is_turned: turned.turned & bit != 0,
+                is_behind: turned.behind & bit != 0,
+                place: None,
+                away_sq: f32::INFINITY,
+                apart_sq: (SPREAD * elements.arrays.radii[i]).powi(2),
+            });
+        }
+    }
+}
+
+impl PlaceVisitor for Gather<'_, '_> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.near.most_sq
+    }
+
+    #[inline(always)]
+    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
+        self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        let elements = self.near.elements;
+        for part in elements.arrays.leaves.blocks(number) {
+            self.block(simd, number, part);
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,64 @@
+//! The side of a surface on which a shape is.
+
+use nearmiss_geometry::nalgebra::Vector3;
+
+use crate::leaf::disc_triangle::FlatDisc;
+use crate::solid::elements::Elements;
+use crate::solid::hint::{MOST, ShapeHint};
+
+type Vector = Vector3<f64>;
+
+/// A contact of the last frame within this distance decides the side, in local radii.
+const REACH: f64 = 4.0;
+
+/// What decides the direction in which a shape moves out of a disc: the scan if it is oriented, then a
+/// contact of the last frame, then a point of the shape. In the stored frame.
+#[derive(Debug)]
+pub(crate) struct Sides {
+    pub(crate) is_oriented: bool,
+    /// The point whose side of a surface is that of the shape.
+    pub(crate) inside: Vector,
+    /// The points and normals of the contacts of the last frame.
+    known: [(Vector, Vector); MOST],
+    count: usize,
+}
+
+impl Sides {
+    pub(crate) fn new(elements: &Elements<'_>, inside: Vector, hint: Option<&ShapeHint>) -> Self {
+        let frame = elements.placed.stored_to_world();
+        let is_oriented = elements.placed.scan().is_oriented();
+        let (mut known, mut count) = ([(Vector::zeros(), Vector::zeros()); MOST], 0);
+        for contact in hint.into_iter().flat_map(ShapeHint::contacts) {
+            known[count] =
+                (frame.apply_inverse(contact.point).into(), frame.rotate_inverse(contact.normal).into());
+            count += 1;
+        }
+        Self { is_oriented, inside, known, count }
+    }
+
+    /// Returns `true` if contacts of the last frame decide about discs near them.
+    pub(crate) fn has_contacts(&self) -> bool {
+        !self.is_oriented && self.count > 0
+    }
+
+    /// The sign of the normal of a disc in the direction in which the shape moves out, and `true` if the
+    /// shape is behind the disc. `band` is the local radius.
+    pub(crate) fn of(&self, disc: &FlatDisc, band: f64) -> (f64, bool) {
+        let height = disc.normal.dot(&(self.inside - disc.centre));
+        let sign = if self.is_oriented {
+            1.0
+        } else {
+            let decisive = self.known(disc, band).unwrap_or(height);
+            1.0_f64.copysign(decisive)
+        };
+        (sign, sign * height < 0.0)
+    }
+
+    /// The cosine of the normals of a disc and of the nearest contact of the last frame, if that is near.
+    fn known(&self, disc: &FlatDisc, band: f64) -> Option<f64> {
+        let away = |known: &(Vector, Vector)| (known.0 - disc.centre).norm_squared();
+        let nearest = self.known[..self.count].iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let along = nearest.1.dot(&disc.normal);
+        (away(nearest) <= (REACH * band).powi(2) && along != 0.0).then_some(along)
+    }
+}
