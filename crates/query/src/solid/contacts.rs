@@ -7,10 +7,12 @@
 //! depends on it: the bounds of [`gather`](crate::solid::gather) tell where the deepest may be.
 
 use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{PointKind, THICKNESS};
+use nearmiss_lanes::id32;
 use nearmiss_surface::Status;
 
 use crate::ask::options::Detail;
@@ -20,7 +22,7 @@ use crate::solid::answer::ShapeContact;
 use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
-use crate::solid::gather::{Candidate, Gather, SPREAD};
+use crate::solid::gather::{Candidate, Gather, Known, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
 use crate::solid::place::{Place, of_disc, place_at, place_beside};
 use crate::solid::sides::Sides;
@@ -42,6 +44,7 @@ pub(crate) struct Candidates {
     found: Vec<Candidate>,
     missed: Vec<Candidate>,
     places: Vec<Met>,
+    order: BinaryHeap<(u64, u32)>,
 }
 
 /// A contact, where it is in the stored frame, and the index and the local radius of its point.
@@ -59,12 +62,16 @@ struct Selection<'s, 'a> {
     solid: &'s Solid<'s>,
     found: &'s mut Vec<Candidate>,
     places: &'s mut Vec<Met>,
-    /// Candidates without a place, which the shape may be beside.
+    /// Candidates that the shape is not over, and may be beside.
     missed: &'s mut Vec<Candidate>,
+    /// Candidates that are still to be looked at, by the number that matters.
+    order: &'s mut BinaryHeap<(u64, u32)>,
     taken: [Option<Met>; MOST],
     count: usize,
-    /// The furthest candidate from all contacts, if no candidate was removed since the last contact.
+    /// The furthest candidate from all contacts, until it is looked at.
     next: Option<usize>,
+    /// `true` if `order` has the others.
+    is_ordered: bool,
 }
 
 /// Writes the manifold of `solid` and the scan to `out`.
@@ -81,7 +88,7 @@ pub(crate) fn contacts(
         let own = hint.as_deref().and_then(|hint| hint.centre);
         let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
         let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
-        let Candidates { found, missed, places } = candidates;
+        let Candidates { found, missed, places, order } = candidates;
         found.clear();
         missed.clear();
         places.clear();
@@ -91,8 +98,18 @@ pub(crate) fn contacts(
         // The visitor never breaks.
         let search = &mut Gather { near, sides: &sides, found: &mut *found, missed: &mut *missed };
         let _whole = near.descend(level, &starts, search);
-        let mut selection =
-            Selection { elements, solid, found, missed, places, taken: [None; MOST], count: 0, next: None };
+        let mut selection = Selection {
+            elements,
+            solid,
+            found,
+            missed,
+            places,
+            order,
+            taken: [None; MOST],
+            count: 0,
+            next: None,
+            is_ordered: false,
+        };
         selection.run(hint.as_deref());
         for (n, met) in selection.taken.iter().flatten().enumerate() {
             (points[n], bands[n]) = (met.i, met.band);
@@ -145,45 +162,53 @@ impl Selection<'_, '_> {
 
     /// The deepest contact of a shape that is only beside discs.
     fn beside(&self) -> Option<Met> {
-        let places = self.missed.iter().filter_map(|it| {
+        let places = self.missed.iter().chain(self.found.iter()).filter_map(|it| {
             let (i, sign) = (it.i as usize, it.sign());
             Some(Met::new(self.elements, i, &place_beside(self.elements, self.solid, i, sign)?))
         });
         places.max_by(Met::deeper)
     }
 
-    /// Computes the place of a candidate. Removes a candidate without one and returns `None`.
+    /// Computes the place of a candidate.
     fn place(&mut self, n: usize) -> Option<usize> {
         let candidate = self.found[n];
-        if let Some(known) = candidate.place {
-            return Some(known as usize);
+        match candidate.known {
+            Known::Place(number) => return Some(number as usize),
+            Known::Unusable => return None,
+            Known::Nothing => {}
         }
         let i = candidate.i as usize;
         let Some(place) = place_at(self.elements, self.solid, i, candidate.sign()) else {
-            let missed = self.remove(n);
-            self.missed.push(missed);
+            self.found[n].known = Known::Unusable;
             return None;
         };
         let number = self.places.len();
         self.places.push(Met::new(self.elements, i, &place));
-        self.found[n].place = u32::try_from(number).ok();
+        self.found[n].known = Known::Place(id32(number));
         Some(number)
+    }
+
+    /// Sets the order of the candidates that `is_wanted`: the greatest `number` first. O(n).
+    fn set_order(&mut self, is_wanted: impl Fn(&Candidate) -> bool, number: impl Fn(&Candidate) -> f32) {
+        let mut all = std::mem::take(self.order).into_vec();
+        all.clear();
+        let wanted = self.found.iter().enumerate().filter(|(_, it)| is_wanted(it));
+        all.extend(wanted.map(|(n, it)| (it.key(number(it)), id32(n))));
+        *self.order = BinaryHeap::from(all);
     }
 
     /// Returns the number of the deepest place, up to [`LEVEL`], of those before or behind the surface.
     /// Computes places as long as another one may be deeper.
     fn deepest(&mut self, is_front: bool) -> Option<usize> {
+        self.set_order(|it| it.is_behind != is_front, |it| it.most);
         let mut best: Option<usize> = None;
-        loop {
-            let unknown = self.found.iter().enumerate();
-            let unknown = unknown.filter(|(_, it)| it.place.is_none() && it.is_behind != is_front);
-            let next = unknown.max_by_key(|(_, it)| it.key(it.most));
-            let Some((n, most)) = next.map(|(n, it)| (n, f64::from(it.most))) else { return best };
+        while let Some((_, n)) = self.order.pop() {
+            let n = n as usize;
             if let Some(best) = best
                 && let Met { contact, band, .. } = &self.places[best]
-                && contact.depth + LEVEL * band >= most * self.elements.scale()
+                && contact.depth + LEVEL * band >= f64::from(self.found[n].most) * self.elements.scale()
             {
-                return Some(best);
+                break;
             }
             if let Some(own) = self.place(n)
                 && best.is_none_or(|best| self.places[best].deeper(&self.places[own]) == Ordering::Less)
@@ -191,6 +216,7 @@ impl Selection<'_, '_> {
                 best = Some(own);
             }
         }
+        best
     }
 
     /// Takes the place of a candidate near a contact of the last frame, if it continues that.
@@ -204,7 +230,7 @@ impl Selection<'_, '_> {
         for attempt in 0..TRIES {
             let away_sq = |it: &Candidate| (Vector::from(it.centre.map(f64::from)) - at).norm_squared();
             let all = self.found.iter().enumerate();
-            let all = all.filter(|(_, it)| !tried.contains(&it.i));
+            let all = all.filter(|(_, it)| !tried.contains(&it.i) && it.known != Known::Unusable);
             let all = all.map(|(n, it)| (away_sq(it), n));
             let nearest = all
                 .min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| self.found[a.1].i.cmp(&self.found[b.1].i)));
@@ -228,21 +254,23 @@ impl Selection<'_, '_> {
     /// Returns the number of the place of the furthest disc or ball from all contacts.
     fn furthest(&mut self) -> Option<usize> {
         loop {
-            let all = self.found.iter().enumerate();
-            let next = self.next.take().or_else(|| Some(all.max_by_key(|(_, it)| it.key(it.away_sq))?.0));
-            let n = next?;
+            let n = match self.next.take() {
+                Some(n) => n,
+                None => {
+                    if !self.is_ordered {
+                        self.set_order(|it| it.known != Known::Unusable, |it| it.away_sq);
+                        self.is_ordered = true;
+                    }
+                    self.order.pop()?.1 as usize
+                }
+            };
             if let Some(own) = self.place(n) {
                 if self.is_free(own) {
                     return Some(own);
                 }
-                self.remove(n);
+                self.found[n].known = Known::Unusable;
             }
         }
-    }
-
-    fn remove(&mut self, n: usize) -> Candidate {
-        self.next = None;
-        self.found.swap_remove(n)
     }
 
     /// Returns `true` if a place is apart from all contacts.
@@ -260,11 +288,12 @@ impl Selection<'_, '_> {
         #[expect(clippy::cast_possible_truncation, reason = "as precise as the positions")]
         let at = [0, 1, 2].map(|k| met.at[k] as f32);
         let (mut kept, mut greatest) = (0, 0);
-        self.next = None;
+        (self.next, self.is_ordered) = (None, false);
         self.found.retain_mut(|other| {
             let [x, y, z] = [other.centre[0] - at[0], other.centre[1] - at[1], other.centre[2] - at[2]];
             other.away_sq = other.away_sq.min(x * x + y * y + z * z);
-            let is_kept = other.away_sq >= other.apart_sq && other.i as usize != met.i;
+            let is_apart = other.away_sq >= other.apart_sq && other.i as usize != met.i;
+            let is_kept = is_apart && other.known != Known::Unusable;
             if is_kept {
                 let key = other.key(other.away_sq);
                 if key > greatest {

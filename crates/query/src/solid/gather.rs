@@ -18,6 +18,16 @@ use crate::solid::sides::Sides;
 /// Two contacts of a manifold are at least this far apart, in local radii.
 pub(crate) const SPREAD: f32 = 0.5;
 
+/// What is known about the contact of a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Known {
+    Nothing,
+    /// The number of its place.
+    Place(u32),
+    /// It has no place, or one that is near a contact.
+    Unusable,
+}
+
 /// The error of a component of a stored normal.
 const NORMAL: f32 = 1e-4;
 
@@ -34,8 +44,7 @@ pub(crate) struct Candidate {
     pub(crate) is_turned: bool,
     /// `true` if the shape is behind the surface.
     pub(crate) is_behind: bool,
-    /// The number of the place that was computed.
-    pub(crate) place: Option<u32>,
+    pub(crate) known: Known,
     /// The squared distance from the nearest contact that was selected.
     pub(crate) away_sq: f32,
     /// The least of these distances at which it gives another contact.
@@ -149,7 +158,7 @@ impl Gather<'_, '_> {
                 most: if turned.unsure & bit == 0 { depths[lane] } else { f32::INFINITY },
                 is_turned: turned.turned & bit != 0,
                 is_behind: turned.behind & bit != 0,
-                place: None,
+                known: Known::Nothing,
                 away_sq: f32::INFINITY,
                 apart_sq: (SPREAD * elements.arrays.radii[i]).powi(2),
             });
