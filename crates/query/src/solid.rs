@@ -18,6 +18,7 @@ pub(crate) mod place;
 pub(crate) mod plan;
 pub(crate) mod ray;
 pub(crate) mod ray_lanes;
+pub(crate) mod refine;
 pub(crate) mod scratch;
 pub(crate) mod shape;
 pub(crate) mod sides;

@@ -109,7 +109,7 @@ impl<'a> Target<'a> {
         distance(&self.elements, solid.as_ref(), within, scratch.level())
     }
 
-    /// Writes up to eight contacts of a shape with the scan to `out`. The first is the deepest, up to 0.005
+    /// Writes up to eight contacts of a shape with the scan to `out`. The first is the deepest, up to 0.01
     /// local radii. Each of the others is that of the disc or ball furthest from all earlier ones. With a
     /// margin, gaps within it are contacts of negative depth. Leaves `out` empty if there are none.
     ///

@@ -11,12 +11,10 @@ use std::collections::BinaryHeap;
 
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{PointKind, THICKNESS};
+use nearmiss_hierarchy::PointKind;
 use nearmiss_lanes::id32;
-use nearmiss_surface::Status;
 
 use crate::ask::options::Detail;
-use crate::leaf::disc_triangle::FlatDisc;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
 use crate::solid::core::Solid;
@@ -24,13 +22,14 @@ use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
 use crate::solid::gather::{Candidate, Gather, Known, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
-use crate::solid::place::{Place, of_disc, place_at, place_beside};
+use crate::solid::place::{Place, place_at, place_beside};
+use crate::solid::refine::refine;
 use crate::solid::sides::Sides;
 
 type Vector = Vector3<f64>;
 
 /// Another contact may be this much deeper than the first, in local radii.
-const LEVEL: f64 = 0.005;
+const LEVEL: f64 = 0.01;
 
 /// Candidates that are compared with a contact of the last frame.
 const TRIES: usize = 3;
@@ -323,71 +322,6 @@ impl Met {
     }
 }
 
-/// Moves a contact from the tangent disc of point `i` onto the surface, with one evaluation. The deepest
-/// contact of the disc also moves over the surface to where that is nearest to the shape, with up to
-/// `slides` more. Leaves the contact on its disc where the surface turns away from the disc by more than
-/// 60°, or `inside` is on another side of it: in noise, or beside another sheet.
-fn refine(
-    elements: &Elements<'_>,
-    (solid, inside): (&Solid<'_>, &Vector),
-    (i, slides): (usize, u32),
-    contact: &mut ShapeContact,
-    scratch: &mut ViewScratch,
-) {
-    /// A contact that moves by less than this is near enough, in disc radii.
-    const NEAR: f64 = 0.05;
-    /// A place of the surface, as a disc, in disc radii.
-    const PLACE: f64 = 0.01;
-    /// The cosine of the greatest angle between the surface and the disc.
-    const TURN: f64 = 0.5;
-    let (placed, band) = (&elements.placed, elements.band(i));
-    let frame = placed.stored_to_world();
-    let radius = f64::from(elements.arrays.discs.get(i));
-    let deepest = |disc: FlatDisc| {
-        of_disc(solid, &solid.gap(&disc, f64::INFINITY), &disc, (disc.normal, false, elements.margin))
-    };
-    let (mut x, own) = (contact.point, Vector::from(contact.normal));
-    let is_before =
-        own.dot(&(Vector::from(placed.stored_to_world().apply((*inside).into())) - Vector::from(x))) >= 0.0;
-    let mut slides = slides;
-    loop {
-        let at = placed.evaluate_near(i, x, scratch);
-        if at.status != Status::Ok || at.f.abs() > band {
-            return;
-        }
-        let upright = Vector::from(at.normal);
-        // f is positive below the surface.
-        let foot = Vector::from(x) + upright * at.f;
-        let disc = FlatDisc {
-            centre: frame.apply_inverse(foot.into()).into(),
-            normal: frame.rotate_inverse((upright * 1.0_f64.copysign(upright.dot(&own))).into()).into(),
-            radius,
-        };
-        let stays = disc.normal.dot(&(inside - disc.centre)) >= 0.0;
-        if upright.dot(&own).abs() < TURN || stays != is_before {
-            return;
-        }
-        if slides > 0
-            && let Some(Place { point, .. }) = deepest(disc)
-            && (point - disc.centre).norm() > NEAR * radius
-        {
-            slides -= 1;
-            x = elements.in_world(&point);
-            continue;
-        }
-        // A shape that is beside this place has no depth there.
-        let least = -elements.margin.max(f64::from(THICKNESS) * radius);
-        if let Some(Place { normal, depth, .. }) =
-            deepest(FlatDisc { radius: PLACE * radius, ..disc }).filter(|found| found.depth >= least)
-        {
-            contact.point = foot.into();
-            contact.depth = depth * elements.scale();
-            contact.normal = elements.turned(&normal);
-        }
-        return;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nearmiss_geometry::{PointCloud, Pose};
@@ -398,6 +332,7 @@ mod tests {
 
     use super::*;
     use crate::ask::options::CollideOptions;
+    use crate::leaf::disc_triangle::FlatDisc;
     use crate::pair::placed::Placed;
     use crate::solid::plan::ShapePlan;
     use crate::solid::shape::Shape;
@@ -421,11 +356,27 @@ mod tests {
     #[test]
     fn contacts_are_those_of_a_selection_among_all_places() {
         let mesh = dragon_mesh(Dragon::Points5k).unwrap();
-        let cloud = PointCloud::from_positions(mesh.vertices()).unwrap();
+        // A strip of random width, whose borders are not straight.
+        let rng = &mut rng(5);
+        let strip: Vec<[f64; 3]> = (0..2000)
+            .map(|_| {
+                let [x, y] = [rng.random_range(0.0..4.0_f64), rng.random_range(-0.5..0.5)];
+                [x, y * (0.2 + (3.0 * x).sin().powi(2)), 0.0]
+            })
+            .collect();
+        for (name, points, full) in [("dragon", mesh.vertices(), 600), ("strip", &strip, 100)] {
+            let found = compare_with_all_places(name, points);
+            assert!(found > full, "{found} full manifolds of {name}");
+        }
+    }
+
+    /// Compares manifolds on a scan of `points` with all places. Returns the number of full ones.
+    fn compare_with_all_places(name: &str, points: &[[f64; 3]]) -> usize {
+        let cloud = PointCloud::from_positions(points).unwrap();
         let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
         let r = scan.sampling_radius();
         let rng = &mut rng(77);
-        let (mut full, mut computed, mut possible) = (0, 0, 0);
+        let mut full = 0;
         for round in 0..1200 {
             let options = CollideOptions::estimated().with_detail(Detail::Verdict);
             let options = options.with_margin([0.0, 0.3 * r][round % 2]);
@@ -441,7 +392,7 @@ mod tests {
             let half = [2.0, 1.0, 0.5].map(|h| h * size);
             let body = rotation(rng).with_translation(centre);
             let shape = match round % 5 {
-                0 => Shape::Sphere { centre, radius: size },
+                0 => Shape::Sphere { centre, radius: [1.0, 0.0, 0.3][round % 3] * size },
                 1 => Shape::Capsule { ends: [centre, end], radius: 0.7 * size },
                 2 => Shape::Box { pose: body, half, radius: 0.0 },
                 3 => Shape::Box { pose: body, half, radius: 0.4 * size },
@@ -452,25 +403,27 @@ mod tests {
             let working = (Level::new(), &mut ViewScratch::default(), &mut candidates);
             contacts(&elements, Some(&solid), None, &mut out, working);
             let [front, behind] = all_places(&elements, &solid);
-            let all = if front.is_empty() { behind } else { front };
-            if all.is_empty() {
-                assert!(out.len() <= 1, "round {round}: {out:?}");
-                continue;
-            }
-            let deepest = all.iter().max_by(|a, b| a.deeper(b)).unwrap();
-            let least = deepest.contact.depth - LEVEL * deepest.band;
-            assert!(out[0].depth >= least, "round {round}: {:?}, deepest {deepest:?}", out[0]);
-            let ids: Vec<u64> = all.iter().map(|met| met.contact.id).collect();
-            let own = |contact: &ShapeContact| {
-                let n = ids.iter().position(|&id| id == contact.id);
-                let n = n.unwrap_or_else(|| panic!("round {round}: {contact:?} is no place"));
-                assert_eq!(all[n].contact, *contact, "round {round}");
-                all[n]
-            };
-            // Boxes of nodes contain discs without their thickness.
+            // Boxes of nodes contain discs without their thickness, so these may be missed.
             let is_near = |met: &&Met| {
                 let gap = elements.gap(&solid, met.i, elements.margin).0;
                 gap.distance <= solid.radius + elements.margin
+            };
+            let all = if front.iter().any(|met| is_near(&met)) { front } else { [front, behind].concat() };
+            let near: Vec<Met> = all.iter().filter(is_near).copied().collect();
+            if near.is_empty() {
+                assert!(out.len() <= all.len().max(1), "{name}, round {round}: {out:?}");
+                continue;
+            }
+            let deepest = near.iter().max_by(|a, b| a.deeper(b)).unwrap();
+            let band = all.iter().find(|met| met.contact.id == out[0].id).map_or(0.0, |met| met.band);
+            let least = deepest.contact.depth - LEVEL * band;
+            assert!(out[0].depth >= least, "{name}, round {round}: {:?}, deepest {deepest:?}", out[0]);
+            let ids: Vec<u64> = all.iter().map(|met| met.contact.id).collect();
+            let own = |contact: &ShapeContact| {
+                let n = ids.iter().position(|&id| id == contact.id);
+                let n = n.unwrap_or_else(|| panic!("{name}, round {round}: {contact:?} is no place"));
+                assert_eq!(all[n].contact, *contact, "{name}, round {round}");
+                all[n]
             };
             // Each further one is the disc or ball furthest from those before.
             let taken: Vec<Met> = out.iter().map(own).collect();
@@ -479,21 +432,19 @@ mod tests {
                 let away = |x: Vector| before.iter().map(|it| (x - it.at).norm()).fold(f64::MAX, f64::min);
                 let centre_of = |met: &Met| elements.position(met.i);
                 let reach = taken.get(n).map_or(0.0, |next| away(centre_of(next)));
-                for other in all.iter().filter(is_near) {
+                for other in &near {
                     let least = f64::from(SPREAD * elements.arrays.radii[other.i]);
                     let is_free = away(other.at).min(away(centre_of(other))) > least * (1.0 + 1e-4);
                     let is_taken = taken.iter().any(|it| it.i == other.i);
                     assert!(
                         is_taken || !is_free || away(centre_of(other)) <= reach * (1.0 + 1e-4),
-                        "round {round}: {:?} is further than contact {n}, {other:?}",
+                        "{name}, round {round}: {:?} is further than contact {n}, {other:?}",
                         away(centre_of(other))
                     );
                 }
             }
             full += usize::from(out.len() == MOST);
-            computed += candidates.places.len();
-            possible += all.len();
         }
-        println!("{full} full, {computed} of {possible}");
+        full
     }
 }

@@ -16,6 +16,9 @@ use crate::solid::lanes::LaneBox;
 /// The cosine below which the plane of a face is too steep to bound the depth over a disc across it.
 const STEEP: f32 = 0.1;
 
+/// The error of the square of a slope.
+const LEVEL: f32 = 1e-4;
+
 /// The discs of sixteen points, relative to the centre of a shape's box.
 #[derive(Clone, Copy)]
 pub(crate) struct LaneDiscs<S: Simd> {
@@ -23,11 +26,13 @@ pub(crate) struct LaneDiscs<S: Simd> {
     /// Unit normals, on the side to which the shape moves out.
     pub(crate) out: Vectors<S>,
     pub(crate) radii: f32x16<S>,
+    /// The errors of heights.
+    pub(crate) slack: f32x16<S>,
 }
 
 impl LaneBox {
-    /// Upper bounds on the depths of a shape with this box and this radius over discs, up to rounding.
-    /// Negative infinity where no part of the shape is over the disc. O(1).
+    /// Upper bounds on the depths of a shape with this box and this radius over discs. Negative infinity
+    /// where no part of the shape is over the disc. O(1).
     #[inline(always)]
     pub(crate) fn depths<S: Simd>(&self, simd: S, discs: &LaneDiscs<S>, radius: f32) -> f32x16<S> {
         if !self.is_near {
@@ -58,7 +63,7 @@ impl LaneBox {
         radius: f32,
     ) -> f32x16<S> {
         let (zero, none) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, f32::INFINITY));
-        let mut most = reach + height + radius;
+        let mut most = reach + height + discs.slack + radius;
         for k in 0..3 {
             let (rise, at) = (rises[k], along(discs.centres, self.axes[k]));
             let cosine = rise.abs();
@@ -66,9 +71,9 @@ impl LaneBox {
             // The face that looks down.
             let is_upper: mask32x16<S> = rise.simd_gt(zero);
             let beyond = is_upper.select(at, -at) + (self.half[k] + radius);
-            let slope = (1.0 - rise * rise).max(zero).sqrt();
+            let slope = ((1.0 - rise * rise).max(zero) + LEVEL).sqrt();
             // Negative if the disc is outside the face.
-            let within = beyond + discs.radii * slope;
+            let within = beyond + discs.radii * slope + discs.slack;
             let is_outside: mask32x16<S> = within.simd_lt(zero);
             let by_face = within / cosine.max(STEEP);
             most = most.min((is_steep & !is_outside).select(none, by_face));
@@ -86,24 +91,31 @@ impl LaneBox {
     ) -> f32x16<S> {
         let zero = f32x16::splat(simd, 0.0);
         let least = f32x16::splat(simd, f32::NEG_INFINITY);
-        let at = along(discs.centres, self.axes[0]);
-        // The length of the axis' shadow, and the disc's places along it and across.
+        let axis = self.axes[0];
+        let at = along(discs.centres, axis);
+        let [x, y, z] = discs.centres;
+        // From the axis to the disc, which cancels less than what is far along the axis.
+        let away = [x - at * axis[0], y - at * axis[1], z - at * axis[2]];
+        let up = product(away, discs.out);
+        // The length of the axis' shadow, and the disc's distances from the shadow and along it.
         let shadow = (1.0 - rise * rise).max(zero).sqrt();
-        let across_sq = (squared(discs.centres) - height * height).max(zero);
         let is_steep: mask32x16<S> = shadow.simd_lt(STEEP);
+        let across = up / shadow.max(STEEP);
+        let beside = (squared(away) - across * across).max(zero).sqrt();
+        let beside = is_steep.select(zero, (beside - discs.radii - discs.slack).max(zero));
+        let radial = (squared(discs.centres) - height * height).max(zero).sqrt();
         let place = (at - height * rise) / shadow.max(STEEP);
-        let beside = (across_sq - place * place).max(zero).sqrt();
-        let along_it = is_steep.select(across_sq.sqrt(), place.abs());
-        let beside = is_steep.select(zero, (beside - discs.radii).max(zero));
-        let beyond = (along_it - discs.radii - shadow * self.half[0]).max(zero);
+        let along_it = is_steep.select(radial, place.abs());
+        let slack = discs.slack / shadow.max(STEEP);
+        let beyond = (along_it - discs.radii - slack - shadow * self.half[0]).max(zero);
         // What is left of the radius that far from the shadow.
         let across_left_sq = radius * radius - beside * beside;
         let left_sq = across_left_sq - beyond * beyond;
         let is_over: mask32x16<S> = left_sq.simd_ge(zero);
-        let by_end = reach + height + left_sq.max(zero).sqrt();
+        let by_end = reach + height + discs.slack + left_sq.max(zero).sqrt();
         // Seen along its axis, the shape is a circle.
         let left = across_left_sq.max(zero).sqrt();
-        let by_side = (left * shadow + height - at * rise + discs.radii * rise.abs() * shadow)
+        let by_side = (left * shadow + up + discs.slack + discs.radii * rise.abs() * shadow)
             / (shadow * shadow).max(STEEP * STEEP);
         let by_side = is_steep.select(by_end, by_side);
         is_over.select(by_end.min(by_side), least)
@@ -179,6 +191,8 @@ mod tests {
                 let out = Vector::from(unit_vector(rng));
                 // Most discs are near the lowest place of the shape.
                 let near = solid.support(&-out) - out * solid.radius;
+                // Stored normals are off by up to a step.
+                let out = out.map(|x| (x * 32767.0).floor() / 32767.0);
                 (near + Vector::from(point_in(rng, 0.5)), out, rng.random_range(0.02..0.2))
             });
             for level in levels() {
@@ -189,12 +203,13 @@ mod tests {
                     };
                     let centres = [0, 1, 2].map(|k| each(&|disc| disc.0[k] - solid.centre[k]));
                     let out = [0, 1, 2].map(|k| each(&|disc| disc.1[k]));
-                    let discs = LaneDiscs { centres, out, radii: each(&|disc| disc.2) };
+                    let slack = f32x16::splat(simd, 2e-4);
+                    let discs = LaneDiscs { centres, out, radii: each(&|disc| disc.2), slack };
                     #[expect(clippy::cast_possible_truncation, reason = "single precision")]
                     lane_box.depths(simd, &discs, solid.radius as f32).to_array()
                 });
                 for (&(centre, out, radius), bound) in discs.iter().zip(found) {
-                    let Some(depth) = sampled(&solid, centre, out, radius) else { continue };
+                    let Some(depth) = sampled(&solid, centre, out.normalize(), radius) else { continue };
                     let bound = f64::from(bound);
                     assert!(
                         bound >= depth - 1e-5,

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{LeafBlock, PlaceVisitor, Siblings, THICKNESS};
+use nearmiss_hierarchy::{LeafBlock, PlaceVisitor, PointKind, Siblings, THICKNESS};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{Bits, along, bits, product};
 
@@ -47,7 +47,7 @@ pub(crate) struct Candidate {
     pub(crate) known: Known,
     /// The squared distance from the nearest contact that was selected.
     pub(crate) away_sq: f32,
-    /// The least of these distances at which it gives another contact.
+    /// It gives another contact from this squared distance on.
     pub(crate) apart_sq: f32,
 }
 
@@ -113,7 +113,8 @@ impl Gather<'_, '_> {
         let parts = elements.parts(simd, leaf, part, false);
         let Measured { distances, tilt, .. } = Measured::new(simd, &lane_box, block);
         let gaps = distances.from(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
-        let lanes = Elements::within(simd, (&gaps.to_array(), count), most);
+        let gaps = gaps.to_array();
+        let lanes = Elements::within(simd, (&gaps, count), most);
         if lanes == 0 {
             return;
         }
@@ -139,23 +140,23 @@ impl Gather<'_, '_> {
         let is_turned = mask32x16::from_bitmask(simd, u64::from(turned.turned));
         let [x, y, z] = normals;
         let out = [is_turned.select(-x, x), is_turned.select(-y, y), is_turned.select(-z, z)];
-        let of_discs =
-            lane_box.depths(simd, &LaneDiscs { centres: d, out, radii: parts.radii }, radius) + tilt;
+        let of_discs = LaneDiscs { centres: d, out, radii: parts.radii, slack: tilt };
+        let of_discs = lane_box.depths(simd, &of_discs, radius);
         let is_in: mask32x16<S> = distances.from_point.simd_le(tilt);
         let of_balls = is_in.select(none, parts.radii + radius - distances.from_point + tilt);
         let depths = parts.discs.select(of_discs, of_balls).to_array();
-        // The least depth of a contact.
         #[expect(clippy::cast_possible_truncation, reason = "depths are rounded more")]
-        let least = -(parts.radii * THICKNESS).max(elements.margin as f32);
-        let is_over: mask32x16<S> = parts.discs.select(of_discs, of_balls).simd_ge(least);
-        let over = bits(is_over) | turned.unsure;
+        let least = (parts.radii * -THICKNESS).min(-elements.margin as f32).to_array();
         for lane in Bits(turned.lanes) {
             let (i, bit) = (first + lane, 1 << lane);
-            let list = if over & bit == 0 { &mut *self.missed } else { &mut *self.found };
+            let is_edge = elements.placed.scan().kind(i) == PointKind::Edge;
+            // Beside a border, the depth is along the way to the border.
+            let depth = if is_edge { depths[lane].max(radius - gaps[lane]) } else { depths[lane] };
+            let list = if depth < least[lane] { &mut *self.missed } else { &mut *self.found };
             list.push(Candidate {
                 centre: elements.arrays.position(i),
                 i: id32(i),
-                most: if turned.unsure & bit == 0 { depths[lane] } else { f32::INFINITY },
+                most: depth,
                 is_turned: turned.turned & bit != 0,
                 is_behind: turned.behind & bit != 0,
                 known: Known::Nothing,

@@ -48,7 +48,7 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
                 && (is_near(solid, &disc, &point, most) || near_gap(elements, solid, i).is_some());
             return is_met.then(|| Place { point, normal: out, depth: solid.radius - height });
         }
-    } else if solid.radius == 0.0 && solid.is_box() && !is_edge {
+    } else if solid.radius == 0.0 && solid.is_box() && !solid.is_point() && !is_edge {
         return None;
     }
     let gap = near_gap(elements, solid, i)?;
