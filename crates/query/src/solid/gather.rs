@@ -18,7 +18,7 @@ use crate::solid::sides::Sides;
 /// Two contacts of a manifold are at least this far apart, in local radii.
 pub(crate) const SPREAD: f32 = 0.5;
 
-/// What is known about the contact of a candidate.
+/// The state of the place of a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Known {
     Nothing,

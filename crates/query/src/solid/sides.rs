@@ -11,7 +11,7 @@ type Vector = Vector3<f64>;
 /// A contact of the last frame within this distance decides the side, in local radii.
 const REACH: f64 = 4.0;
 
-/// What decides the direction in which a shape moves out of a disc: the scan if it is oriented, then a
+/// The rules for the direction in which a shape moves out of a disc: the scan if it is oriented, then a
 /// contact of the last frame, then a point of the shape. In the stored frame.
 #[derive(Debug)]
 pub(crate) struct Sides {
