@@ -403,7 +403,7 @@ mod tests {
             let working = (Level::new(), &mut ViewScratch::default(), &mut candidates);
             contacts(&elements, Some(&solid), None, &mut out, working);
             let [front, behind] = all_places(&elements, &solid);
-            // Boxes of nodes contain discs without their thickness, so these may be missed.
+            // Leaves are searched for discs without their thickness at the rim, so others may be missed.
             let is_near = |met: &&Met| {
                 let gap = elements.gap(&solid, met.i, elements.margin).0;
                 gap.distance <= solid.radius + elements.margin
