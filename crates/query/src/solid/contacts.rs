@@ -124,12 +124,13 @@ pub(crate) fn contacts(
             let deepest = (0..out.len()).max_by(|&a, &b| out[a].depth.total_cmp(&out[b].depth));
             if let Some(deepest) = deepest.filter(|&n| out[n].depth > out[0].depth) {
                 out.swap(0, deepest);
+                points.swap(0, deepest);
                 bands.swap(0, deepest);
             }
         }
     }
     if let Some(hint) = hint {
-        hint.number(out, &bands);
+        hint.number(out, (&points, &bands));
     }
 }
 
@@ -148,7 +149,7 @@ impl Selection<'_, '_> {
             None => self.taken[0] = self.beside(),
             Some(n) => {
                 self.take(n);
-                for known in hint.into_iter().flat_map(ShapeHint::contacts) {
+                for known in hint.into_iter().flat_map(ShapeHint::contacts_of_points) {
                     self.continue_from(known);
                 }
                 while self.count < MOST {
@@ -218,8 +219,9 @@ impl Selection<'_, '_> {
         best
     }
 
-    /// Takes the place of a candidate near a contact of the last frame, if it continues that.
-    fn continue_from(&mut self, known: &ShapeContact) {
+    /// Takes the place of a candidate that continues a contact of the last frame: of the same point or,
+    /// without that, near the contact.
+    fn continue_from(&mut self, (known, point): (&ShapeContact, usize)) {
         let taken = || self.taken.iter().flatten();
         if self.count == MOST || taken().any(|own| ShapeHint::continues(known, &own.contact, own.band)) {
             return;
@@ -227,7 +229,10 @@ impl Selection<'_, '_> {
         let at = Vector::from(self.elements.placed.stored_to_world().apply_inverse(known.point));
         let mut tried = [u32::MAX; TRIES];
         for attempt in 0..TRIES {
-            let away_sq = |it: &Candidate| (Vector::from(it.centre.map(f64::from)) - at).norm_squared();
+            let away_sq = |it: &Candidate| {
+                let is_same = it.i as usize == point;
+                if is_same { 0.0 } else { (Vector::from(it.centre.map(f64::from)) - at).norm_squared() }
+            };
             let all = self.found.iter().enumerate();
             let all = all.filter(|(_, it)| !tried.contains(&it.i) && it.known != Known::Unusable);
             let all = all.map(|(n, it)| (away_sq(it), n));

@@ -22,6 +22,8 @@ const COUNTED: u64 = 1 << 32;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ShapeHint {
     contacts: [Option<ShapeContact>; MOST],
+    /// The indices of their points.
+    points: [usize; MOST],
     /// The number of ids given so far.
     counted: u64,
     /// The point whose side of a surface counts instead of the shape's centre.
@@ -45,6 +47,11 @@ impl ShapeHint {
         self.contacts.iter().flatten()
     }
 
+    /// The contacts of the last frame, with the indices of their points.
+    pub(crate) fn contacts_of_points(&self) -> impl Iterator<Item = (&ShapeContact, usize)> {
+        self.contacts.iter().zip(self.points).filter_map(|(contact, i)| Some((contact.as_ref()?, i)))
+    }
+
     /// Returns `true` if a contact continues one of the last frame. `band` is its local radius.
     pub(crate) fn continues(known: &ShapeContact, contact: &ShapeContact, band: f64) -> bool {
         let away = Vector3::from(known.point) - Vector3::from(contact.point);
@@ -53,8 +60,12 @@ impl ShapeHint {
     }
 
     /// Gives each contact the id of the one that it continues, or a new one, and remembers them.
-    /// `bands` are the local radii.
-    pub(crate) fn number(&mut self, contacts: &mut [ShapeContact], bands: &[f64; MOST]) {
+    /// `points` are the indices of their points, and `bands` the local radii of these.
+    pub(crate) fn number(
+        &mut self,
+        contacts: &mut [ShapeContact],
+        (points, bands): (&[usize; MOST], &[f64; MOST]),
+    ) {
         let mut taken = [false; MOST];
         for (n, contact) in contacts.iter_mut().enumerate().take(MOST) {
             let mut best: Option<(usize, f64)> = None;
@@ -76,7 +87,7 @@ impl ShapeHint {
                 }
             };
         }
-        self.contacts = [None; MOST];
+        (self.contacts, self.points) = ([None; MOST], *points);
         for (kept, contact) in self.contacts.iter_mut().zip(contacts) {
             *kept = Some(*contact);
         }
