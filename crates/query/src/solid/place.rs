@@ -46,7 +46,7 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
             let point = lowest - out * height;
             let is_met = height <= most
                 && (is_near(solid, &disc, &point, most) || near_gap(elements, solid, i).is_some());
-            return is_met.then(|| Place { point, normal: out, depth: solid.radius - height });
+            return is_met.then_some(Place { point, normal: out, depth: solid.radius - height });
         }
     } else if solid.radius == 0.0 && solid.is_box() && !solid.is_point() && !is_edge {
         return None;
