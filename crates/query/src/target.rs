@@ -109,9 +109,11 @@ impl<'a> Target<'a> {
         distance(&self.elements, solid.as_ref(), within, scratch.level())
     }
 
-    /// Writes up to eight contacts of a shape with the scan to `out`. The first is the deepest, up to 0.01
-    /// local radii. Each of the others is that of the disc or ball furthest from all earlier ones. With a
-    /// margin, gaps within it are contacts of negative depth. Leaves `out` empty if there are none.
+    /// Writes up to eight contacts of a shape with the scan to `out`. Clears `out` first.
+    ///
+    /// The first contact is the deepest, up to 0.01 local radii. Each of the others is that of the disc or
+    /// ball furthest from all earlier ones. If the plan has a margin, a shape that is apart by less than the
+    /// margin has contacts of negative depth.
     ///
     /// The normal of a disc points outwards if the scan is oriented, otherwise to the side of the
     /// shape's centre. If some contacts are before their surface and others behind theirs, as at a thin

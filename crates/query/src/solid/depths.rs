@@ -108,7 +108,7 @@ impl LaneBox {
         let along_it = is_steep.select(radial, place.abs());
         let slack = discs.slack / shadow.max(STEEP);
         let beyond = (along_it - discs.radii - slack - shadow * self.half[0]).max(zero);
-        // What is left of the radius that far from the shadow.
+        // Half the height of the shape over a place at that distance from the shadow.
         let across_left_sq = radius * radius - beside * beside;
         let left_sq = across_left_sq - beyond * beyond;
         let is_over: mask32x16<S> = left_sq.simd_ge(zero);
