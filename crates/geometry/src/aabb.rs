@@ -26,6 +26,7 @@ impl Aabb {
     }
 
     /// Grows the box until it contains `p`.
+    #[inline]
     pub fn grow(&mut self, p: [f64; 3]) {
         for (k, &x) in p.iter().enumerate() {
             self.min[k] = self.min[k].min(x);

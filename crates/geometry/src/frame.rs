@@ -46,6 +46,7 @@ impl Frame {
     }
 
     /// Converts a point from the caller's frame to the local frame, rounding to `f32`.
+    #[inline]
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is the purpose")]
     pub fn to_local(&self, p: [f64; 3]) -> [f32; 3] {

@@ -72,7 +72,7 @@ pub struct Repeated {
     count: usize,
 }
 
-/// Number of records that are sorted together; they fit into a cache.
+/// Number of records that are searched together; they fit into a cache.
 const TOGETHER: usize = 1 << 17;
 
 /// Binary logarithm of the greatest number of groups of records.
@@ -81,22 +81,27 @@ const MOST_GROUPS: u32 = 8;
 /// Number of records of a group that are written at once: 64 KiB.
 const RUN: usize = 1 << 12;
 
+/// Number of places of a hash table that are tried for a record. The table is at most half full, so more
+/// are needed only if many hashes are alike.
+const MOST_TRIES: usize = 64;
+
 impl Repeated {
     /// Finds the repeated points among `points`.
     ///
     /// `records` is scratch memory with one element for each point. It may be larger than main
-    /// memory: it is written in runs of 64 KiB, and then sorted group by group. Takes O(n log n)
-    /// time and up to 16 MiB.
+    /// memory: it is written in runs of 64 KiB, and then searched group by group. Takes O(n)
+    /// time, or O(n log n) where many hashes are alike, and some 20 MiB.
     ///
     /// # Panics
     /// Panics if `records` is shorter than `points`.
     #[must_use]
     pub fn among(points: &[[f32; 3]], records: &mut [u128]) -> Self {
         let records = &mut records[..points.len()];
+        let mut table = Vec::new();
         if points.len() <= TOGETHER {
             records.iter_mut().zip((0..).zip(points)).for_each(|(to, (i, p))| *to = record(*p, i));
             let mut repeated = Self::none(points.len());
-            repeated.find(records);
+            repeated.find(records, &mut table);
             return repeated;
         }
         // Equal points have equal hashes, so they are in the same group.
@@ -126,7 +131,7 @@ impl Repeated {
         runs.iter_mut().enumerate().for_each(|(group, run)| write(group, run));
         drop(runs);
         let mut repeated = Self::none(points.len());
-        starts.windows(2).for_each(|group| repeated.find(&mut records[group[0]..group[1]]));
+        starts.windows(2).for_each(|group| repeated.find(&mut records[group[0]..group[1]], &mut table));
         repeated
     }
 
@@ -134,20 +139,55 @@ impl Repeated {
         Self { bits: vec![0; points.div_ceil(64)], count: 0 }
     }
 
-    /// Adds the points of `records` that repeat an earlier point.
-    fn find(&mut self, records: &mut [u128]) {
+    /// Adds the points of `records` that repeat an earlier point. Indices ascend. `table` is reused
+    /// memory.
+    fn find(&mut self, records: &mut [u128], table: &mut Vec<u32>) {
+        if u32::try_from(records.len()).is_err() || !self.find_by_hash(records, table) {
+            self.find_by_order(records);
+        }
+    }
+
+    /// Finds them in O(n). Returns `false`, and adds none, if hashes that are alike make that slow.
+    fn find_by_hash(&mut self, records: &[u128], table: &mut Vec<u32>) -> bool {
+        const FREE: u32 = u32::MAX;
+        let mask = (2 * records.len()).next_power_of_two() - 1;
+        table.clear();
+        table.resize(mask + 1, FREE);
+        let mut found = Vec::new();
+        for (number, record) in (0_u32..).zip(records) {
+            #[expect(clippy::cast_possible_truncation, reason = "the lowest bits of the hash")]
+            let first = (record >> 64) as usize & mask;
+            let places = (first..first + MOST_TRIES).map(|place| place & mask);
+            let is_known = |place: &usize| {
+                let other = table[*place];
+                other == FREE || records[other as usize] >> 32 == record >> 32
+            };
+            match places.into_iter().find(is_known) {
+                None => return false,
+                Some(place) if table[place] == FREE => table[place] = number,
+                Some(_) => found.push(*record),
+            }
+        }
+        found.into_iter().for_each(|record| self.add(record));
+        true
+    }
+
+    /// Finds them in O(n log n).
+    fn find_by_order(&mut self, records: &mut [u128]) {
         // The upper half of a record is faster to sort, and differs for nearly all distinct points.
         let half = |record: u128| (record >> 64) as u64;
         records.sort_unstable_by_key(|record| half(*record));
         for alike in records.chunk_by_mut(|a, b| half(*a) == half(*b)).filter(|alike| alike.len() > 1) {
             alike.sort_unstable();
-            for two in alike.windows(2).filter(|two| two[0] >> 32 == two[1] >> 32) {
-                #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
-                let i = two[1] as u32 as usize;
-                self.bits[i / 64] |= 1 << (i % 64);
-                self.count += 1;
-            }
+            alike.windows(2).filter(|two| two[0] >> 32 == two[1] >> 32).for_each(|two| self.add(two[1]));
         }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
+    fn add(&mut self, record: u128) {
+        let i = record as u32 as usize;
+        self.bits[i / 64] |= 1 << (i % 64);
+        self.count += 1;
     }
 
     /// Returns `true` if point `i` repeats an earlier point.
@@ -202,10 +242,27 @@ mod tests {
                 points[1] = [0.0; 3];
             }
             let found = Repeated::among(&points, &mut vec![0; count]);
+            let mut records: Vec<u128> = (0..).zip(&points).map(|(i, p)| record(*p, i)).collect();
+            let mut by_order = Repeated::none(count);
+            by_order.find_by_order(&mut records);
+            assert_eq!(by_order, found, "{count} points, by order");
             let mut seen = BTreeSet::new();
             let expected: Vec<bool> = points.iter().map(|p| !seen.insert(p.map(f32::to_bits))).collect();
             assert!((0..count).all(|i| found.contains(i) == expected[i]), "{count} points");
             assert_eq!(found.count(), expected.iter().filter(|is| **is).count());
         }
+    }
+
+    #[test]
+    fn records_of_one_hash_are_found_by_order() {
+        // Two points of each of a hundred places.
+        let mut records: Vec<u128> =
+            (0..200_u32).map(|i| 7 << 64 | u128::from(i % 100) << 32 | u128::from(i)).collect();
+        let mut found = Repeated::none(200);
+        assert!(!found.find_by_hash(&records, &mut Vec::new()), "too many of one hash");
+        assert_eq!(found.count(), 0);
+        found.find(&mut records, &mut Vec::new());
+        assert!((0..200).all(|i| found.contains(i) == (i >= 100)));
+        assert_eq!(found.count(), 100);
     }
 }

@@ -52,6 +52,17 @@ pub fn cross<S: Simd, V: SimdBase<S>>(a: [V; 3], b: [V; 3]) -> [V; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// Returns the [tangents](crate::vector::tangents) of each unit vector.
+#[inline(always)]
+#[must_use]
+pub fn tangents<S: Simd>(simd: S, [x, y, z]: Vectors<S>) -> [Vectors<S>; 2] {
+    let one = f32x16::splat(simd, 1.0);
+    let sign = one.copysign(z);
+    let a = -one / (sign + z);
+    let b = x * y * a;
+    [[sign * x * x * a + 1.0, sign * b, -sign * x], [b, sign + y * y * a, -y]]
+}
+
 /// Returns the squared length of each vector.
 #[inline(always)]
 #[must_use]
@@ -167,8 +178,10 @@ pub fn greatest<S: Simd>(lanes: f32x16<S>, greatest: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use fearless_simd::{Level, dispatch};
+    use nearmiss_testdata::arbitrary::{rng, unit_vector};
 
     use super::*;
+    use crate::vector;
 
     #[test]
     fn cube_roots_are_those_of_the_numbers() {
@@ -183,6 +196,34 @@ mod tests {
             }
         }
         assert!((0.0..1e-12).contains(&root(0.0)), "{}", root(0.0));
+    }
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    fn tangents_have_the_same_bits_as_those_of_one_vector() {
+        let rng = &mut rng(4);
+        let poles = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, -0.0], [0.0, -1.0, 0.0]];
+        for step in 0..100 {
+            let mut normals = [[0.0; WIDTH]; 3];
+            let vectors: [[f32; 3]; WIDTH] = std::array::from_fn(|lane| match poles.get(lane) {
+                Some(pole) if step == 0 => *pole,
+                _ => unit_vector(rng).map(|x| x as f32),
+            });
+            for (lane, vector) in vectors.iter().enumerate() {
+                for k in 0..3 {
+                    normals[k][lane] = vector[k];
+                }
+            }
+            let found = dispatch!(Level::new(), simd => {
+                let [u, v] = tangents(simd, load(simd, &normals));
+                [u, v].map(|v| v.map(|x| x.to_array()))
+            });
+            for (lane, vector) in vectors.into_iter().enumerate() {
+                let (u, v) = vector::tangents(vector);
+                let found = found.map(|v| v.map(|x| x[lane].to_bits()));
+                assert_eq!(found, [u, v].map(|v| v.map(f32::to_bits)), "{vector:?}");
+            }
+        }
     }
 
     #[test]

@@ -52,10 +52,14 @@ impl EigenBlock {
     #[inline]
     #[must_use]
     pub fn get(&self, lane: usize) -> Eigen3 {
-        Eigen3 {
-            values: self.values.each_ref().map(|x| x[lane]),
-            vectors: self.vectors.each_ref().map(|v| v.each_ref().map(|x| x[lane])),
+        let (mut values, mut vectors) = ([0.0; 3], [[0.0; 3]; 3]);
+        for i in 0..3 {
+            values[i] = self.values[i][lane];
+            for k in 0..3 {
+                vectors[i][k] = self.vectors[i][k][lane];
+            }
         }
+        Eigen3 { values, vectors }
     }
 }
 

@@ -3,11 +3,9 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
+use nearmiss_lanes::wide::Bits;
 
 use crate::{Moments, SurfacePlan};
-
-/// The number of points.
-const WIDTH: usize = 16;
 
 /// Running sums about sixteen points, as [`crate::Neighbourhood`] keeps them about one.
 #[derive(Debug, Clone, Copy)]
@@ -66,32 +64,34 @@ impl<'a, S: Simd> SideBySide<'a, S> {
         self.support += simd.select_f32x16(counts, f32x16::splat(simd, 1.0), zero);
     }
 
-    /// Returns the sums about each point.
+    /// Appends the sums about the points in `lanes`, given as bits, to `all`.
     #[inline(always)]
-    #[must_use]
-    pub fn moments(&self) -> [Moments; WIDTH] {
+    pub fn append_to(&self, all: &mut Vec<Moments>, lanes: u32) {
         let (weight, nearest) = (self.weight.to_array(), self.nearest.to_array());
         let (support, radius) = (self.support.to_array(), self.support_radius.to_array());
         let [x, y, z] = self.first;
         let first = [x.to_array(), y.to_array(), z.to_array()];
         let [a, b, c, d, e, f] = self.second;
         let second = [a.to_array(), b.to_array(), c.to_array(), d.to_array(), e.to_array(), f.to_array()];
-        let mut all = [Moments::default(); WIDTH];
-        for (lane, moments) in all.iter_mut().enumerate() {
-            moments.weight = f64::from(weight[lane]);
+        for lane in Bits(lanes) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
+            let support = support[lane] as u32;
+            let mut moments = Moments {
+                weight: f64::from(weight[lane]),
+                first: [0.0; 3],
+                second: [0.0; 6],
+                support_radius: f64::from(radius[lane]),
+                nearest: nearest[lane],
+                support,
+            };
             for k in 0..3 {
                 moments.first[k] = f64::from(first[k][lane]);
             }
             for k in 0..6 {
                 moments.second[k] = f64::from(second[k][lane]);
             }
-            moments.support_radius = f64::from(radius[lane]);
-            moments.nearest = nearest[lane];
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
-            let support = support[lane] as u32;
-            moments.support = support;
+            all.push(moments);
         }
-        all
     }
 }
 
@@ -127,9 +127,13 @@ mod tests {
                     let splat = |x| f32x16::splat(simd, x);
                     sums.add(simd, d, splat(support), splat(plan.decay(support)));
                 }
-                sums.moments()
+                let (mut all, [first, others]) = (Vec::new(), [1, 0xfffe]);
+                sums.append_to(&mut all, first);
+                sums.append_to(&mut all, others);
+                all
             },
         ));
+        assert_eq!(found.len(), centres.len());
         for (centre, found) in centres.iter().zip(found) {
             let x = centre.map(f64::from);
             let expected = Moments::about(Level::new(), &plan, x, blocks.iter().copied());

@@ -43,22 +43,33 @@ pub const SLACK: f32 = 4e-6;
 impl OrientedBox {
     /// Returns the smallest box along `axes` that contains an interval on each axis, grown by the
     /// rounding error.
+    #[inline]
     pub(crate) fn spanned(axes: Axes, low: [f32; 3], high: [f32; 3], reach: f32) -> Self {
-        let middle = [0, 1, 2].map(|k| 0.5 * low[k] + 0.5 * high[k]);
-        let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
-        let centre =
-            [0, 1, 2].map(|k| middle[0] * axes[0][k] + middle[1] * axes[1][k] + middle[2] * axes[2][k]);
-        let half = [0, 1, 2].map(|k| 0.5 * high[k] - 0.5 * low[k] + ROUNDING * far);
+        let (mut middle, mut far) = ([0.0; 3], 0.0_f32);
+        for k in 0..3 {
+            middle[k] = 0.5 * low[k] + 0.5 * high[k];
+            far = far.max(low[k].abs()).max(high[k].abs());
+        }
+        let (mut centre, mut half) = ([0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            centre[k] = middle[0] * axes[0][k] + middle[1] * axes[1][k] + middle[2] * axes[2][k];
+            half[k] = 0.5 * high[k] - 0.5 * low[k] + ROUNDING * far;
+        }
         Self { centre, half, axes, reach }
     }
 
     /// Returns the interval of the box along each of `axes`.
+    #[inline]
     pub(crate) fn along(&self, axes: &Axes) -> [[f32; 2]; 3] {
-        axes.map(|axis| {
-            let middle = dot(axis, self.centre);
-            let spread: f32 = (0..3).map(|k| self.half[k] * dot(axis, self.axes[k]).abs()).sum();
-            [middle - spread, middle + spread]
-        })
+        let mut intervals = [[0.0; 2]; 3];
+        for (interval, axis) in intervals.iter_mut().zip(axes) {
+            let (middle, mut spread) = (dot(*axis, self.centre), 0.0);
+            for k in 0..3 {
+                spread += self.half[k] * dot(*axis, self.axes[k]).abs();
+            }
+            *interval = [middle - spread, middle + spread];
+        }
+        intervals
     }
 
     /// Returns the squared distance of `p` from the box, 0 inside.

@@ -20,6 +20,7 @@ pub struct Growth {
 }
 
 /// Returns the upper half of a length, rounded up; [`BOUNDLESS`] for NaN.
+#[inline]
 fn up(length: f32) -> u16 {
     let bits = if length <= f32::MAX { length.max(0.0).to_bits() } else { f32::INFINITY.to_bits() };
     u16::try_from(bits.saturating_add(0xffff) >> 16).unwrap_or(BOUNDLESS).min(BOUNDLESS)
@@ -36,16 +37,27 @@ fn length(half: u16) -> f32 {
 impl Growth {
     /// Returns the growth of `bounds` that makes it contain these intervals along its axes.
     pub(crate) fn new(bounds: &OrientedBox, low: [f32; 3], high: [f32; 3]) -> Self {
-        let own = bounds.along(&bounds.axes);
-        let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
+        Self::beyond(&bounds.along(&bounds.axes), low, high)
+    }
+
+    /// Does the same for a box with the intervals `own` along its axes.
+    #[inline]
+    pub(crate) fn beyond(own: &[[f32; 2]; 3], low: [f32; 3], high: [f32; 3]) -> Self {
+        let mut far = 0.0_f32;
+        for k in 0..3 {
+            far = far.max(low[k].abs()).max(high[k].abs());
+        }
         let more = ROUNDING * far;
         // Not `max`, which would turn NaN into zero.
         let side = |beyond: f32| up(if beyond < 0.0 { more } else { beyond + more });
-        let in_order = |k: usize, beyond: f32| if low[k] <= high[k] { beyond } else { f32::NAN };
-        Self {
-            low: [0, 1, 2].map(|k| side(in_order(k, own[k][0] - low[k]))),
-            high: [0, 1, 2].map(|k| side(in_order(k, high[k] - own[k][1]))),
+        let mut growth = Self { low: [BOUNDLESS; 3], high: [BOUNDLESS; 3] };
+        for k in 0..3 {
+            if low[k] <= high[k] {
+                growth.low[k] = side(own[k][0] - low[k]);
+                growth.high[k] = side(high[k] - own[k][1]);
+            }
         }
+        growth
     }
 
     /// Returns `bounds` grown. Infinite lengths do not move the centre.

@@ -102,8 +102,9 @@ pub(crate) fn bound_parts(
             || extents(simd, (points, parts), range, &bounds.axes),
         ));
         *bounds = OrientedBox::spanned(bounds.axes, discs[0], discs[1], reach);
-        let surface = [points[0].map(|x| x - beyond), points[1].map(|x| x + beyond)];
-        *growths = [surface, cells].map(|[low, high]| Growth::new(bounds, low, high));
+        let own = bounds.along(&bounds.axes);
+        let surface = Growth::beyond(&own, points[0].map(|x| x - beyond), points[1].map(|x| x + beyond));
+        *growths = [surface, Growth::beyond(&own, cells[0], cells[1])];
     });
     let (boxes, growths): (&[_], &[_]) = (boxes, growths);
     change_both(large_boxes, large_growths, 1, |id, bounds, of_node| {
@@ -147,7 +148,10 @@ fn about(
     }
     let [discs, surface, obstacle] = spans;
     let bounds = OrientedBox::spanned(*axes, discs[0], discs[1], reach);
-    (bounds, [surface, obstacle].map(|[low, high]| Growth::new(&bounds, low, high)))
+    let own = bounds.along(axes);
+    let growths =
+        [Growth::beyond(&own, surface[0], surface[1]), Growth::beyond(&own, obstacle[0], obstacle[1])];
+    (bounds, growths)
 }
 
 /// The least and greatest coordinates of some points along three axes.

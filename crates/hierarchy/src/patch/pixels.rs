@@ -3,10 +3,9 @@
 //! over windows of pixels in place of balls.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16};
+use fearless_simd::{Level, Simd, dispatch, mask32x16};
 use nearmiss_lanes::parallel::{change_runs, map_each};
-use nearmiss_lanes::vector::tangents;
-use nearmiss_lanes::wide::{Bits, Vectors, product};
+use nearmiss_lanes::wide::{Bits, load, product, tangents};
 use nearmiss_surface::{Moments, SideBySide, SurfacePlan};
 
 use crate::patch::classes::corrected;
@@ -21,16 +20,14 @@ use crate::point::spacing::Look;
 pub(crate) fn fit(raster: &Raster, plan: &SurfacePlan, reach: f32, fits: &mut [Fit]) {
     let level = Level::new();
     change_runs(fits, raster.width, |row, fits| {
-        let (mut pixels, mut places, mut moments) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut pixels, mut places) = (Vec::with_capacity(raster.width), Vec::new());
+        let mut moments = Vec::with_capacity(raster.width);
         for (here, there) in raster.row(row) {
-            let sums = dispatch!(level, simd => simd.vectorize(
+            dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || sums(simd, raster, plan, here),
+                || sums(simd, raster, plan, here).append_to(&mut moments, there),
             ));
-            for lane in Bits(there) {
-                pixels.push(here.pixel(lane));
-                moments.push(sums[lane]);
-            }
+            pixels.extend(Bits(there).map(|lane| here.pixel(lane)));
         }
         // Centroids are not asked for.
         places.resize(pixels.len(), [0.0; 3]);
@@ -46,7 +43,7 @@ pub(crate) fn fit(raster: &Raster, plan: &SurfacePlan, reach: f32, fits: &mut [F
 }
 
 #[inline(always)]
-fn sums<S: Simd>(simd: S, raster: &Raster, plan: &SurfacePlan, here: Sixteen) -> [Moments; WIDTH] {
+fn sums<'a, S: Simd>(simd: S, raster: &Raster, plan: &'a SurfacePlan, here: Sixteen) -> SideBySide<'a, S> {
     let mut sums = SideBySide::new(simd, plan);
     raster.around(
         simd,
@@ -54,7 +51,7 @@ fn sums<S: Simd>(simd: S, raster: &Raster, plan: &SurfacePlan, here: Sixteen) ->
         #[inline(always)]
         |d, support, decay| sums.add(simd, d, support, decay),
     );
-    sums.moments()
+    sums
 }
 
 /// Corrects the classes of single points by those of the eight pixels around, where some are noisy.
@@ -85,38 +82,35 @@ pub(crate) fn find_borders(raster: &Raster, fits: &[Fit], codes: &mut [PointCode
     let level = Level::new();
     change_runs(codes, raster.width, |row, codes| {
         for (here, there) in raster.row(row) {
-            let number = |lane: usize| raster.number(here.pixel(lane));
-            let (mut u, mut v) = ([[0.0; WIDTH]; 3], [[0.0; WIDTH]; 3]);
+            let fit = |lane: usize| &fits[raster.number(here.pixel(lane))];
+            let mut normals = [[0.0; WIDTH]; 3];
             for lane in Bits(there) {
-                let (along, across) = tangents(fits[number(lane)].normal);
                 for k in 0..3 {
-                    (u[k][lane], v[k][lane]) = (along[k], across[k]);
+                    normals[k][lane] = fit(lane).normal[k];
                 }
             }
             let gaps = dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || gaps(simd, raster, here, (&u, &v)),
+                || gaps(simd, raster, (here, there), &normals),
             ));
             for lane in Bits(there) {
-                let kind = fits[number(lane)].kind();
-                codes[usize::from(here.pixel(lane).column)] = PointCode::new(kind, gaps[lane]);
+                let code = PointCode::new(fit(lane).kind(), gaps[lane].cast_unsigned());
+                codes[usize::from(here.pixel(lane).column)] = code;
             }
         }
     });
 }
 
-/// Returns the widest gap between the neighbours of sixteen pixels, given their tangents.
+/// Returns the widest gap between the neighbours of those of sixteen pixels that are `there`, given
+/// their normals.
 #[inline(always)]
 fn gaps<S: Simd>(
     simd: S,
     raster: &Raster,
-    here: Sixteen,
-    (u, v): (&[[f32; WIDTH]; 3], &[[f32; WIDTH]; 3]),
-) -> [u32; WIDTH] {
-    let load = |rows: &[[f32; WIDTH]; 3]| -> Vectors<S> {
-        [0, 1, 2].map(|k| f32x16::load_array_ref(simd, &rows[k]))
-    };
-    let (u, v, mut taken) = (load(u), load(v), Taken::new(simd));
+    (here, there): (Sixteen, u32),
+    normals: &[[f32; WIDTH]; 3],
+) -> [i32; WIDTH] {
+    let ([u, v], mut taken) = (tangents(simd, load(simd, normals)), Taken::new(simd));
     raster.around(
         simd,
         here,
@@ -126,5 +120,5 @@ fn gaps<S: Simd>(
             taken.add(simd, support, d_sq, flat);
         },
     );
-    taken.gaps()
+    taken.gaps(simd, mask32x16::from_bitmask(simd, u64::from(there)))
 }

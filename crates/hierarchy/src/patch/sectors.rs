@@ -7,6 +7,9 @@ use fearless_simd::{Simd, f32x16, i32x16, mask32x16};
 /// diamond, so they are 11 to 18 degrees wide.
 const SECTORS: u32 = 24;
 
+/// The bits of all sectors.
+const ROUND: i32 = (1 << SECTORS) - 1;
+
 /// The sectors of the tangent plane of a point with points that support it, as bits, in lanes.
 pub(crate) struct Taken<S: Simd>(i32x16<S>);
 
@@ -43,10 +46,23 @@ impl<S: Simd> Taken<S> {
         widest_gap_beside(self.0.to_array().into_iter().fold(0, |all, bits| all | bits))
     }
 
-    /// Returns the same for each lane alone, where each has a point of its own.
+    /// Returns the same for each lane alone, where each has a point of its own; 0 for lanes other than
+    /// those of `lanes`.
     #[inline(always)]
-    pub(crate) fn gaps(self) -> [u32; 16] {
-        self.0.to_array().map(widest_gap_beside)
+    pub(crate) fn gaps(self, simd: S, lanes: mask32x16<S>) -> [i32; 16] {
+        let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
+        let free = simd.select_i32x16(lanes, self.0 ^ ROUND, zero);
+        let (mut runs, mut widest) = (free, zero);
+        // After k steps a bit remains for each run longer than k.
+        for _ in 0..SECTORS {
+            let remains: mask32x16<S> = runs.simd_gt(zero);
+            if !remains.any_true() {
+                break;
+            }
+            widest += simd.select_i32x16(remains, one, zero);
+            runs &= ((runs << 1) | (runs >> (SECTORS - 1))) & ROUND;
+        }
+        widest.to_array()
     }
 }
 
@@ -74,4 +90,46 @@ fn bit<S: Simd>(number: f32x16<S>) -> i32x16<S> {
     let exponent = i32x16::truncate_from(number) + ONE;
     let power: f32x16<S> = (exponent << DIGITS).bitcast();
     i32x16::truncate_from(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+    use nearmiss_testdata::arbitrary::rng;
+    use rand::RngExt;
+
+    use super::*;
+
+    #[test]
+    fn gaps_in_lanes_are_those_of_a_walk_around_the_point() {
+        let walk = |taken: i32| {
+            let is_free = |i: u32| taken >> (i % SECTORS) & 1 == 0;
+            let run = |start: u32| (start..start + SECTORS).take_while(|i| is_free(*i)).count();
+            (0..SECTORS).map(run).max().unwrap()
+        };
+        let mut rng = rng(9);
+        for step in 0..500 {
+            let taken: [i32; 16] = std::array::from_fn(|lane| match (step, lane) {
+                (0, 0) => 0,
+                (0, 1) => ROUND,
+                // Few sectors taken, or few free.
+                _ => {
+                    let [a, b, c] = [(); 3].map(|()| rng.random::<i32>() & ROUND);
+                    if lane % 2 == 0 { a & b & c } else { a | b }
+                }
+            });
+            let lanes: u16 = if step == 0 { u16::MAX } else { rng.random() };
+            let found = dispatch!(Level::new(), simd => {
+                Taken(i32x16::load_array_ref(simd, &taken))
+                    .gaps(simd, mask32x16::from_bitmask(simd, u64::from(lanes)))
+            });
+            for lane in 0..16 {
+                let expected = if lanes >> lane & 1 == 1 { walk(taken[lane]) } else { 0 };
+                assert_eq!(usize::try_from(found[lane]), Ok(expected), "{:024b}", taken[lane]);
+                if lanes >> lane & 1 == 1 {
+                    assert_eq!(widest_gap_beside(taken[lane]) as usize, expected, "{:024b}", taken[lane]);
+                }
+            }
+        }
+    }
 }

@@ -1,7 +1,10 @@
 //! The motion of the points of a leaf as an affine map, fitted by least squares, and how a disc
 //! follows it.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::vector::{cross, dot, sub, tangents};
+use nearmiss_lanes::wide::{WIDTH, along, load, squared};
 
 /// The ridge of the fit as a share of the second moments. It draws directions in which the points do
 /// not extend, such as the normal of a flat patch, towards the identity.
@@ -130,20 +133,49 @@ impl Rest {
 }
 
 impl Motion {
-    /// Returns where a unit normal points after the motion. If the motion flattens its plane, it
-    /// stays.
-    pub(crate) fn normal(&self, n: [f32; 3]) -> [f32; 3] {
+    /// Sets `normals` to where the unit normals `before` point after the motion. If the motion
+    /// flattens the plane of one, that stays.
+    #[inline(always)]
+    pub(crate) fn turn<S: Simd>(&self, simd: S, before: &[[f32; 3]], normals: &mut [[f32; 3]]) {
         let [x, y, z] = &self.cofactors;
-        let m = [0, 1, 2].map(|k| n[0] * x[k] + n[1] * y[k] + n[2] * z[k]);
-        let length = dot(m, m).sqrt();
-        let scale = 1.0 / length;
-        if length > f32::MIN_POSITIVE && length.is_finite() { m.map(|c| c * scale) } else { n }
+        for (before, normals) in before.chunks(WIDTH).zip(normals.chunks_mut(WIDTH)) {
+            let mut rows = [[0.0; WIDTH]; 3];
+            for (lane, n) in before.iter().enumerate() {
+                for k in 0..3 {
+                    rows[k][lane] = n[k];
+                }
+            }
+            let n = load(simd, &rows);
+            let mut turned = n;
+            for k in 0..3 {
+                turned[k] = along(n, [x[k], y[k], z[k]]);
+            }
+            let length = squared(turned).sqrt();
+            let is_sound: mask32x16<S> = length.simd_gt(f32::MIN_POSITIVE) & length.simd_le(f32::MAX);
+            let scale = f32x16::splat(simd, 1.0) / length;
+            for k in 0..3 {
+                rows[k] = simd.select_f32x16(is_sound, turned[k] * scale, n[k]).to_array();
+            }
+            for (lane, n) in normals.iter_mut().enumerate() {
+                *n = [rows[0][lane], rows[1][lane], rows[2][lane]];
+            }
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
+
+    /// Returns where a normal points, taken among others.
+    fn turned(motion: &Motion, normal: [f32; 3]) -> [f32; 3] {
+        let before: Vec<[f32; 3]> = (0..20).map(|i| if i == 17 { normal } else { [0.0, 1.0, 0.0] }).collect();
+        let mut normals = vec![[f32::NAN; 3]; 20];
+        dispatch!(Level::new(), simd => motion.turn(simd, &before, &mut normals));
+        normals[17]
+    }
 
     fn patch() -> Vec<[f32; 3]> {
         let lattice = (0..16_u8).map(|i| [f32::from(i % 4), f32::from(i / 4)]);
@@ -165,19 +197,22 @@ mod tests {
     fn a_rigid_motion_keeps_lengths_and_turns_normals() {
         let still = motion_by(|p| p);
         assert!(still.is_carried && still.stretch == 1.0, "{still:?}");
-        assert!(is_near(still.normal([0.6, 0.0, 0.8]), [0.6, 0.0, 0.8]), "{still:?}");
+        assert!(is_near(turned(&still, [0.6, 0.0, 0.8]), [0.6, 0.0, 0.8]), "{still:?}");
         // A quarter turn about the y axis.
-        let turned = motion_by(|[x, y, z]| [z + 7.0, y, -x]);
-        assert!(turned.is_carried && turned.stretch == 1.0, "{turned:?}");
-        assert!(is_near(turned.normal([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]), "{turned:?}");
-        assert!(is_near(turned.normal([0.2, 0.0, 0.98]), [0.98, 0.0, -0.2]), "{turned:?}");
+        let quarter = motion_by(|[x, y, z]| [z + 7.0, y, -x]);
+        assert!(quarter.is_carried && quarter.stretch == 1.0, "{quarter:?}");
+        assert!(is_near(turned(&quarter, [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]), "{quarter:?}");
+        assert!(is_near(turned(&quarter, [0.2, 0.0, 0.98]), [0.98, 0.0, -0.2]), "{quarter:?}");
     }
 
     #[test]
     fn a_shear_turns_normals_by_the_cofactors() {
         let sheared = motion_by(|[x, y, z]| [x, y, z + 0.2 * x]);
         let length = (1.0_f32 + 0.04).sqrt();
-        assert!(is_near(sheared.normal([0.0, 0.0, 1.0]), [-0.2 / length, 0.0, 1.0 / length]), "{sheared:?}");
+        assert!(
+            is_near(turned(&sheared, [0.0, 0.0, 1.0]), [-0.2 / length, 0.0, 1.0 / length]),
+            "{sheared:?}"
+        );
         assert!((sheared.stretch - length).abs() < 1e-3 && sheared.is_carried, "{sheared:?}");
     }
 
@@ -189,7 +224,7 @@ mod tests {
         assert!(!motion_by(|_| [1.0, 2.0, 3.0]).is_carried, "in one point");
         assert!(!motion_by(|[x, y, z]| [x, y, if x > 101.0 { z + 1.5 } else { z }]).is_carried, "torn");
         assert!(!motion_by(|[x, ..]| [x, f32::NAN, 0.0]).is_carried, "NaN");
-        let flat = motion_by(|_| [1.0, 2.0, 3.0]).normal([0.0, 0.6, 0.8]);
+        let flat = turned(&motion_by(|_| [1.0, 2.0, 3.0]), [0.0, 0.6, 0.8]);
         assert!(flat.iter().all(|c| c.is_finite()), "a direction, whatever it is: {flat:?}");
     }
 }

@@ -56,7 +56,14 @@ pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<Poi
     Ok(groups)
 }
 
-/// Sets `groups` to balls around `blocks` and their support, in less time.
+/// Returns slightly larger balls in less time, for searches that end before the scan is ready.
+pub(crate) fn rough_groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<PointBlock>, WorkError> {
+    let mut groups = work.room(blocks.len().div_ceil(PointBlock::WIDTH))?;
+    groups_in_motion(blocks, &mut groups);
+    Ok(groups)
+}
+
+/// Sets `groups` to slightly larger balls in less time.
 pub(crate) fn groups_in_motion(blocks: &[PointBlock], groups: &mut [PointBlock]) {
     fill_groups(blocks, groups, CENTRING_IN_MOTION);
 }

@@ -1,11 +1,14 @@
 //! The points of a depth frame by pixel. Neighbours of a point are sought among the pixels around it,
 //! so sixteen pixels of a row take the same neighbour at once.
 
+use std::ops::{Range, RangeInclusive};
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_geometry::Frame;
-use nearmiss_lanes::parallel::{change_runs, fill_runs};
+use nearmiss_lanes::parallel::{change_runs, map_each, ranges};
 use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_lanes::wide::Bits;
 
 use crate::point::spacing::GROWTH;
 
@@ -53,6 +56,8 @@ pub(crate) struct Raster {
     radii: Vec<f32>,
     /// The support radii of each row, then their decays.
     supports: Vec<f32>,
+    /// The pixels with points, as one bit each for sixteen in a row.
+    there: Vec<u16>,
     /// The pixels along a curve that stays within small squares before it goes on.
     curve: Vec<Pixel>,
 }
@@ -78,8 +83,7 @@ impl Sixteen {
 }
 
 impl Raster {
-    /// Sets the size of the image, and the places of all pixels. Returns `true` for each pixel with a
-    /// point.
+    /// Sets the size of the image, and the places of all pixels.
     pub(crate) fn place(&mut self, points: &[[f64; 3]], width: usize, frame: &Frame) {
         let height = points.len() / width;
         if (width, height) != (self.width, self.height) {
@@ -94,6 +98,7 @@ impl Raster {
                 spacings: vec![f32::INFINITY; count],
                 radii: vec![0.0; count],
                 supports: vec![0.0; 2 * count],
+                there: vec![0; height * width.div_ceil(WIDTH)],
                 curve,
             };
         }
@@ -107,11 +112,19 @@ impl Raster {
                 }
             }
         });
+        let positions: &[f32] = &self.positions;
+        change_runs(&mut self.there, width.div_ceil(WIDTH), |row, there| {
+            let (xs, _) = positions[3 * (row + MARGIN) * stride + MARGIN..].as_chunks::<WIDTH>();
+            for (bits, xs) in there.iter_mut().zip(xs) {
+                *bits = (0..WIDTH).fold(0, |bits, lane| bits | u16::from(xs[lane] < NOWHERE) << lane);
+            }
+        });
     }
 
     /// Returns the pixels with points, along the curve.
-    pub(crate) fn measured(&self) -> impl Iterator<Item = Pixel> {
-        self.curve.iter().copied().filter(|pixel| self.has(*pixel))
+    pub(crate) fn measured(&self) -> Vec<Pixel> {
+        let some = |range: Range<usize>| self.curve[range].iter().copied().filter(|pixel| self.has(*pixel));
+        ranges(self.curve.len(), |range| some(range).collect::<Vec<_>>()).concat()
     }
 
     fn has(&self, pixel: Pixel) -> bool {
@@ -147,12 +160,9 @@ impl Raster {
 
     /// Returns the pixels of a row, sixteen by sixteen, and the lanes with points as bits.
     pub(crate) fn row(&self, row: usize) -> impl Iterator<Item = (Sixteen, u32)> {
-        (0..self.width).step_by(WIDTH).filter_map(move |column| {
-            let here = Sixteen { row, column };
-            let xs = &self.positions[3 * (row + MARGIN) * self.stride + column + MARGIN..][..WIDTH];
-            let bits =
-                xs.iter().enumerate().fold(0, |bits, (lane, x)| bits | u32::from(*x < NOWHERE) << lane);
-            (bits != 0).then_some((here, bits))
+        let steps = self.width.div_ceil(WIDTH);
+        self.there[row * steps..][..steps].iter().enumerate().filter_map(move |(step, there)| {
+            (*there != 0).then_some((Sixteen { row, column: step * WIDTH }, u32::from(*there)))
         })
     }
 
@@ -220,8 +230,9 @@ impl Raster {
     }
 
     /// Measures the spacing of all points: the distance of the `count`-th neighbour in the window.
-    /// Then smooths them, so that none exceeds that of a neighbour by much.
-    pub(crate) fn space(&mut self, count: usize) {
+    /// Then smooths them, so that none exceeds that of a neighbour by much. Returns the number of points
+    /// whose window has fewer neighbours.
+    pub(crate) fn space(&mut self, count: usize) -> usize {
         let (level, stride) = (Level::new(), self.stride);
         let mut spacings = std::mem::take(&mut self.spacings);
         let raster = &*self;
@@ -246,6 +257,12 @@ impl Raster {
             }
         });
         self.radii = radii;
+        let alone = map_each(self.height, |row| {
+            let alone = |here: Sixteen, lane: usize| !self.spacing(here.pixel(lane)).is_finite();
+            let alone = |(here, there)| Bits(there).filter(|lane| alone(here, *lane)).count();
+            self.row(row).map(alone).sum::<usize>()
+        });
+        alone.into_iter().sum()
     }
 
     #[inline(always)]
@@ -284,17 +301,17 @@ impl Raster {
         out[here.column + MARGIN..][..WIDTH].copy_from_slice(&least.to_array());
     }
 
-    /// Limits the radii to `least..=reach`, and sets the support radii of all points.
+    /// [Limits](limited) the radii, and sets the support radii of all points.
     pub(crate) fn support(
         &mut self,
-        (least, reach): (f32, f32),
+        limits: &RangeInclusive<f32>,
         support_radius: impl Fn(f32) -> f32 + Sync + Send,
         decay: impl Fn(f32) -> f32 + Sync + Send,
     ) {
         let stride = self.stride;
-        fill_runs(&mut self.radii, stride, |_, radii| {
+        change_runs(&mut self.radii, stride, |_, radii| {
             for radius in radii {
-                *radius = if *radius < reach { radius.max(least) } else { reach };
+                *radius = limited(*radius, limits);
             }
         });
         let radii: &[f32] = &self.radii;
@@ -306,6 +323,11 @@ impl Raster {
             }
         });
     }
+}
+
+/// Returns a radius within limits; the upper one for infinity and NaN.
+pub(crate) fn limited(radius: f32, limits: &RangeInclusive<f32>) -> f32 {
+    if radius < *limits.end() { radius.max(*limits.start()) } else { *limits.end() }
 }
 
 /// Returns the rows of an array that are no margin.

@@ -5,14 +5,15 @@ use std::sync::OnceLock;
 
 use bytemuck::{Pod, Zeroable};
 use nearmiss_geometry::NodeId;
+use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{fill, fill_runs};
+use nearmiss_lanes::parallel::fill_runs;
 use nearmiss_store::{Array, Workspace};
 
 use crate::patch::surfels::{align_leaves, codes_of};
 use crate::point::gather::{Index, NeighbourList};
 use crate::point::leaf_block::LeafParts;
-use crate::point::neighbours::groups;
+use crate::point::neighbours::rough_groups;
 use crate::scan::build::PointHierarchy;
 use crate::scan::closing::Closing;
 use crate::scan::data::Arrays;
@@ -23,6 +24,8 @@ use crate::scan::prepare::about;
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Bare, Root};
 
+const WIDTH: usize = PointBlock::WIDTH;
+
 /// Fits the surface at points that are in order, and bounds the nodes as a refit does.
 pub(crate) fn fitted_anew(
     points: &ScanPoints<'_>,
@@ -32,7 +35,7 @@ pub(crate) fn fitted_anew(
 ) -> Result<PointHierarchy, BuildError> {
     let work = Workspace::in_memory();
     let Ordered { topology, boxes, positions, source, radii, fits, blocks, plan, summary } = ordered;
-    let groups = groups(&blocks, &work)?;
+    let groups = rough_groups(&blocks, &work)?;
     let bare = Bare::new(&work, topology, &boxes)?;
     let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
     let leaves: Vec<u32> = (0..topology.leaves()).map(id32).collect();
@@ -64,7 +67,7 @@ pub(crate) fn fitted_anew(
 /// spread evenly over the points of each node, and the other arrays are to be filled.
 pub(crate) fn resize(scan: &mut PointHierarchy, topology: Topology) {
     let points = topology.points(NodeId::ROOT).len();
-    let blocks = points.div_ceil(nearmiss_index::PointBlock::WIDTH);
+    let blocks = points.div_ceil(WIDTH);
     scan.topology = topology;
     let arrays = &mut scan.arrays;
     sized(&mut arrays.siblings, topology.inner());
@@ -75,7 +78,7 @@ pub(crate) fn resize(scan: &mut PointHierarchy, topology: Topology) {
     sized(&mut arrays.marks, topology.leaves());
     sized(&mut arrays.blocks, blocks);
     sized(&mut arrays.coverings, topology.len());
-    sized(&mut arrays.groups, blocks.div_ceil(nearmiss_index::PointBlock::WIDTH));
+    sized(&mut arrays.groups, blocks.div_ceil(WIDTH));
     sized(&mut arrays.lists, blocks);
     arrays.lists.to_mut().fill(NeighbourList { within: -1.0, first: 0, count: 0 });
     arrays.listed = Array::default();
@@ -103,12 +106,4 @@ fn sized<T: Pod + Zeroable + Send>(array: &mut Array<T>, len: usize) {
         elements.resize(len, T::zeroed());
         *array = elements.into();
     }
-}
-
-/// Sets the normals of all points, each to the side of the others in its leaf.
-pub(crate) fn set_normals(scan: &mut PointHierarchy, normal: impl Fn(usize) -> [f32; 3] + Sync + Send) {
-    let leaf_size = scan.topology.leaf_size();
-    let normals = scan.arrays.normals.to_mut();
-    fill(normals, normal);
-    align_leaves(normals, leaf_size);
 }

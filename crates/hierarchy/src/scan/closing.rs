@@ -1,9 +1,11 @@
 //! The last steps of every frame of a scan that moves: support radii, boxes, enclosures and leaf
 //! records of the current points, radii, normals and classes (`docs/theory/moving.md`).
 
+use std::mem::take;
+
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{change_each, fill};
+use nearmiss_lanes::parallel::{both, change_each, fill};
 use nearmiss_store::Array;
 use nearmiss_surface::{EigenBlock, SurfacePlan};
 
@@ -13,7 +15,6 @@ use crate::patch::covering::Covering;
 use crate::patch::parts::{PartBlock, Parts, bound_parts};
 use crate::point::disc::DiscRadii;
 use crate::point::gather::NeighbourList;
-use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::groups_in_motion;
 use crate::scan::build::PointHierarchy;
 use crate::scan::sampling::quantile;
@@ -31,7 +32,7 @@ pub(crate) struct Closing {
     growths: Vec<[Growth; 2]>,
     spreads: Vec<Spread>,
     solved: Vec<EigenBlock>,
-    counts: Vec<usize>,
+    counts: Vec<u32>,
 }
 
 impl Closing {
@@ -93,22 +94,15 @@ impl Closing {
 
     /// Computes everything that depends on boxes.
     pub(crate) fn finish(&self, scan: &mut PointHierarchy) {
-        let PointHierarchy { meta, topology, arrays, positions, .. } = scan;
-        let parts = LeafParts {
-            positions: positions.get().map_or(&[], |positions| positions),
-            normals: &arrays.normals,
-            discs: DiscRadii {
-                codes: &arrays.codes,
-                radii: &arrays.radii,
-                reach: meta.reach,
-                sampling_radius: meta.sampling_radius,
-            },
-            dense: meta.dense as usize,
-        };
+        let (topology, arrays) = (scan.topology, &mut scan.arrays);
+        spacings(&topology, &arrays.radii, arrays.coverings.to_mut());
+        let (mut blocks, mut marks) = (take(&mut arrays.leaf_blocks), take(&mut arrays.marks));
+        let scanned = &*scan;
         let of_leaf = |leaf: usize| self.boxes[topology.leaf(leaf).index()];
-        parts.fill(topology, of_leaf, (arrays.leaf_blocks.to_mut(), arrays.marks.to_mut()));
-        spacings(topology, &arrays.radii, arrays.coverings.to_mut());
-        scan.meta.outline = scan.outlined();
+        let leaves = || scanned.leaf_parts().fill(&topology, of_leaf, (blocks.to_mut(), marks.to_mut()));
+        let (outline, ()) = both(|| scanned.outlined(), leaves);
+        (scan.arrays.leaf_blocks, scan.arrays.marks) = (blocks, marks);
+        scan.meta.outline = outline;
     }
 }
 

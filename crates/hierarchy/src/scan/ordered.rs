@@ -13,7 +13,7 @@ use crate::bounds::boxes::OrientedBox;
 use crate::patch::classes::{dense_first, vote};
 use crate::patch::surfels::{Fit, fits};
 use crate::point::gather::Index;
-use crate::point::neighbours::{self, groups as groups_of};
+use crate::point::neighbours::{self, rough_groups};
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::points::ScanPoints;
 use crate::scan::sampling::{Sampling, set_reaches};
@@ -72,7 +72,7 @@ impl Ordered {
                 summary,
             });
         }
-        let ordered = Self::new(points, options, unit, topology, work)?;
+        let ordered = Self::new(points, options, 0.0, work)?;
         let ordered = Self {
             boxes: stage.keep("boxes", ordered.boxes)?,
             positions: stage.keep("positions", ordered.positions)?,
@@ -87,15 +87,16 @@ impl Ordered {
     }
 
     /// Orders the points. A first tree of all points gives their spacing and the surface that they
-    /// sample. If some points are sparse, a second tree separates them from the others.
-    fn new(
+    /// sample. If a greater share of the points than `left` is sparse, a second tree separates them
+    /// from the others.
+    pub(crate) fn new(
         points: &ScanPoints<'_>,
         options: &BuildOptions,
-        unit: f64,
-        topology: Topology,
+        left: f64,
         work: &Workspace,
     ) -> Result<Self, BuildError> {
-        let count = points.positions.len();
+        let (count, unit) = (points.positions.len(), 1.0 / points.frame.scale);
+        let topology = Topology::new(id32(count), options.leaf_size);
         let mut items = work.room(count)?;
         // Points ascend by their indices in the input, so these break ties as their positions
         // would.
@@ -114,8 +115,13 @@ impl Ordered {
         let mut ordered =
             Self::classified(topology, boxes, (positions, source), (options, unit, count), work)?;
         let Self { boxes, positions, source, radii, fits, blocks, plan, summary, .. } = &mut ordered;
+        let sparse = fits.iter().filter(|fit| fit.kind().is_sparse()).count();
+        #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+        let are_many = sparse as f64 > left * count as f64;
         let known = (|i: usize| positions[i], |i: usize| fits[i].kind());
-        if let Some((mut items, before)) = dense_first(count, known, options.leaf_size as usize, work)? {
+        if are_many
+            && let Some((mut items, before)) = dense_first(count, known, options.leaf_size as usize, work)?
+        {
             summary.dense = before;
             split(&mut items, &topology, before, Parts::Points, boxes);
             let items: &[Item] = &items;
@@ -160,7 +166,7 @@ impl Ordered {
     ) -> Result<Self, BuildError> {
         let Sampling { spacings, radii, sampling_radius, reach, plan, blocks } =
             Sampling::of(&positions, (&topology, &mut boxes), options, unit, work)?;
-        let groups = groups_of(&blocks, work)?;
+        let groups = rough_groups(&blocks, work)?;
         let bare = Bare::new(work, topology, &boxes)?;
         let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
         let mut fits = fits(&index, &positions, (&radii, &spacings), work)?;

@@ -8,11 +8,11 @@ use nearmiss_lanes::parallel::{both, change_each, fill, ranges};
 use nearmiss_surface::SurfacePlan;
 
 use crate::patch::pixels::{find_borders, fit, vote};
-use crate::patch::surfels::Fit;
+use crate::patch::surfels::{Fit, align_leaves};
 use crate::point::disc::PointCode;
 use crate::point::kind::PointKind;
-use crate::point::raster::{MOST_NEIGHBOURS, MOST_PIXELS, Pixel, Raster, is_measured};
-use crate::scan::anew::{resize, set_normals};
+use crate::point::raster::{MOST_NEIGHBOURS, MOST_PIXELS, Pixel, Raster, is_measured, limited};
+use crate::scan::anew::resize;
 use crate::scan::build::PointHierarchy;
 use crate::scan::closing::Closing;
 use crate::scan::deform_error::DeformError;
@@ -31,6 +31,9 @@ const ALONE: f64 = 0.05;
 /// twice the diagonal of a leaf of four by four pixels.
 const LOOSE: f32 = 6.0;
 
+/// The number of points that a thread takes at once.
+const AT_ONCE: usize = 1 << 12;
+
 /// Memory that depth frames reuse.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Pixels {
@@ -41,7 +44,7 @@ pub(crate) struct Pixels {
     along: Vec<Pixel>,
     radii: Vec<f32>,
     items: Vec<Item>,
-    counts: Vec<usize>,
+    counts: Vec<u32>,
 }
 
 /// Replaces `scan` by the measured points of a depth frame. Returns `false`, and changes nothing, if
@@ -63,19 +66,15 @@ pub(crate) fn replace_organised(
         return Ok(false);
     }
     pixels.raster.place(points, width, &frame);
-    pixels.raster.space(options.radius_neighbours as usize);
-    pixels.along.clear();
-    pixels.along.extend(pixels.raster.measured());
+    let alone = pixels.raster.space(options.radius_neighbours as usize);
+    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+    if alone as f64 > ALONE * count as f64 {
+        return Ok(false);
+    }
+    pixels.along = pixels.raster.measured();
     let Pixels { raster, fits, codes, along, radii, items, counts } = pixels;
     radii.resize(count, 0.0);
     fill(radii, |i| raster.radius(along[i]));
-    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
-    let most_alone = ALONE * count as f64;
-    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
-    let alone = along.iter().filter(|pixel| !raster.spacing(**pixel).is_finite()).count() as f64;
-    if alone > most_alone {
-        return Ok(false);
-    }
     let (unit, ordinary) = (1.0 / frame.scale, quantile(radii, counts));
     let reach = reach_of(options, ordinary, unit);
     let far =
@@ -84,19 +83,16 @@ pub(crate) fn replace_organised(
     check_reach(reach, (far.fold(0.0, f64::max) * unit) as f32, unit)?;
     let plan =
         SurfacePlan::new(&options.surface, f64::from(ordinary.min(reach)), unit).map_err(BuildError::from)?;
-    raster.support(
-        (LEAST_RADIUS, reach),
-        |radius| plan.support_radius(radius),
-        |support| plan.decay(support),
-    );
+    let limits = LEAST_RADIUS..=reach;
+    raster.support(&limits, |radius| plan.support_radius(radius), |support| plan.decay(support));
     fits.resize(points.len(), Fit::default());
     codes.resize(points.len(), PointCode::new(PointKind::Stray, 0));
     fit(raster, &plan, reach, fits);
     vote(raster, fits);
     find_borders(raster, fits, codes);
-    fill(radii, |i| raster.radius(along[i]));
+    change_each(radii, AT_ONCE, |_, radius| *radius = limited(*radius, &limits));
     let topology = Topology::new(id32(count), options.leaf_size);
-    let dense = order(raster, fits, along, items, options.leaf_size as usize);
+    let dense = order(raster, codes, along, items, options.leaf_size as usize);
     split_loose(items, &topology, dense, &|leaf: &[Item]| is_loose(leaf, radii));
     resize(scan, topology);
     let meta = &mut scan.meta;
@@ -117,24 +113,80 @@ pub(crate) fn replace_organised(
 impl Pixels {
     /// Sets the arrays of the points of a scan.
     fn fill(&self, scan: &mut PointHierarchy) {
-        const WIDTH: usize = PointBlock::WIDTH;
-        let Self { raster, fits, codes, along, radii, items, .. } = self;
-        let pixel = |i: usize| raster.number(along[items[i].index as usize]);
-        if let Some(positions) = scan.positions.get_mut() {
-            fill(positions.to_mut(), |i| items[i].position);
+        let (arrays, leaf_size) = (&mut scan.arrays, scan.topology.leaf_size());
+        let Some(positions) = scan.positions.get_mut() else { return };
+        let points = Points {
+            positions: positions.to_mut(),
+            blocks: arrays.blocks.to_mut(),
+            source: arrays.source.to_mut(),
+            radii: arrays.radii.to_mut(),
+            codes: arrays.codes.to_mut(),
+            normals: arrays.normals.to_mut(),
+        };
+        points.fill(0, self);
+        align_leaves(arrays.normals.to_mut(), leaf_size);
+    }
+}
+
+/// The arrays of some points, from the first point of a block on.
+struct Points<'a> {
+    positions: &'a mut [[f32; 3]],
+    blocks: &'a mut [PointBlock],
+    source: &'a mut [u32],
+    radii: &'a mut [f32],
+    codes: &'a mut [PointCode],
+    normals: &'a mut [[f32; 3]],
+}
+
+impl Points<'_> {
+    /// Divides the points at the start of a block.
+    fn split_at(self, block: usize) -> [Self; 2] {
+        let first = block * PointBlock::WIDTH;
+        let (positions, blocks) = (self.positions.split_at_mut(first), self.blocks.split_at_mut(block));
+        let (source, radii) = (self.source.split_at_mut(first), self.radii.split_at_mut(first));
+        let (codes, normals) = (self.codes.split_at_mut(first), self.normals.split_at_mut(first));
+        [
+            Self {
+                positions: positions.0,
+                blocks: blocks.0,
+                source: source.0,
+                radii: radii.0,
+                codes: codes.0,
+                normals: normals.0,
+            },
+            Self {
+                positions: positions.1,
+                blocks: blocks.1,
+                source: source.1,
+                radii: radii.1,
+                codes: codes.1,
+                normals: normals.1,
+            },
+        ]
+    }
+
+    /// Sets the points, of which `first` are before the first one.
+    fn fill(self, first: usize, pixels: &Pixels) {
+        if self.positions.len() > AT_ONCE {
+            let middle = self.blocks.len() / 2;
+            let [left, right] = self.split_at(middle);
+            both(|| left.fill(first, pixels), || right.fill(first + middle * PointBlock::WIDTH, pixels));
+            return;
         }
-        change_each(scan.arrays.blocks.to_mut(), WIDTH, |number, block| {
-            *block = PointBlock::EMPTY;
-            for (lane, item) in items[number * WIDTH..].iter().take(WIDTH).enumerate() {
-                for k in 0..3 {
-                    block.position[k][lane] = item.position[k];
-                }
+        let Pixels { raster, fits, codes, along, radii, items, .. } = pixels;
+        self.blocks.fill(PointBlock::EMPTY);
+        for (i, item) in items[first..][..self.positions.len()].iter().enumerate() {
+            let pixel = raster.number(along[item.index as usize]);
+            let (block, lane) = (&mut self.blocks[i / PointBlock::WIDTH], i % PointBlock::WIDTH);
+            for k in 0..3 {
+                block.position[k][lane] = item.position[k];
             }
-        });
-        fill(scan.arrays.source.to_mut(), |i| id32(pixel(i)));
-        fill(scan.arrays.radii.to_mut(), |i| radii[items[i].index as usize]);
-        fill(scan.arrays.codes.to_mut(), |i| codes[pixel(i)]);
-        set_normals(scan, |i| fits[pixel(i)].normal);
+            self.positions[i] = item.position;
+            self.source[i] = id32(pixel);
+            self.radii[i] = radii[item.index as usize];
+            self.codes[i] = codes[pixel];
+            self.normals[i] = fits[pixel].normal;
+        }
     }
 }
 
@@ -172,10 +224,16 @@ fn is_in_range(bounds: &Aabb) -> bool {
 /// Puts the points into `items` along the curve, the sparse ones last. Returns the number of the
 /// others, which fill whole leaves: a remainder of them is moved to the sparse ones. The index of an
 /// item is its place along the curve.
-fn order(raster: &Raster, fits: &[Fit], along: &[Pixel], items: &mut Vec<Item>, leaf_size: usize) -> usize {
+fn order(
+    raster: &Raster,
+    codes: &[PointCode],
+    along: &[Pixel],
+    items: &mut Vec<Item>,
+    leaf_size: usize,
+) -> usize {
     items.resize(along.len(), Item { position: [0.0; 3], index: 0 });
     fill(items, |i| Item { position: raster.position(along[i]), index: id32(i) });
-    let is_sparse = |i: &usize| fits[raster.number(along[*i])].kind().is_sparse();
+    let is_sparse = |i: &usize| codes[raster.number(along[*i])].kind().is_sparse();
     let sparse: Vec<usize> =
         ranges(along.len(), |range| range.filter(is_sparse).collect::<Vec<_>>()).concat();
     if sparse.is_empty() {

@@ -4,7 +4,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::{Aabb, Frame};
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{change_each, fill};
+use nearmiss_lanes::parallel::{change_each, change_runs, fill};
 use nearmiss_lanes::vector::dot;
 
 use crate::patch::classes::vote_among;
@@ -27,6 +27,9 @@ const OFF: f32 = 0.2;
 pub(crate) const LEAST_RADIUS: f32 = 1e-18;
 
 const WIDTH: usize = PointBlock::WIDTH;
+
+/// The number of leaves that a thread takes at once.
+const LEAVES_AT_ONCE: usize = 64;
 
 /// How the points of a scan followed a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -164,11 +167,24 @@ fn carry(scan: &mut PointHierarchy, memory: &mut Memory) {
         ));
     });
     let (motions, leaf_size): (&[Motion], _) = (motions, topology.leaf_size());
-    fill(scan.arrays.normals.to_mut(), |i| motions[i / leaf_size].normal(normals[i]));
-    fill(scan.arrays.radii.to_mut(), |i| {
-        let motion = &motions[i / leaf_size];
-        let stretch = if motion.is_carried { motion.stretch } else { 1.0 };
-        (radii[i] * stretch).min(reach)
+    let at_once = LEAVES_AT_ONCE * leaf_size;
+    change_runs(scan.arrays.normals.to_mut(), at_once, |number, some| {
+        let leaves = some.chunks_mut(leaf_size).zip(normals[number * at_once..].chunks(leaf_size));
+        for ((now, before), motion) in leaves.zip(&motions[number * LEAVES_AT_ONCE..]) {
+            dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || motion.turn(simd, before, now),
+            ));
+        }
+    });
+    change_runs(scan.arrays.radii.to_mut(), at_once, |number, some| {
+        let leaves = some.chunks_mut(leaf_size).zip(radii[number * at_once..].chunks(leaf_size));
+        for ((now, before), motion) in leaves.zip(&motions[number * LEAVES_AT_ONCE..]) {
+            let stretch = if motion.is_carried { motion.stretch } else { 1.0 };
+            for (now, before) in now.iter_mut().zip(before) {
+                *now = (before * stretch).min(reach);
+            }
+        }
     });
 }
 

@@ -93,9 +93,9 @@ fn extent(positions: &[[f32; 3]]) -> f32 {
 /// Returns the [sampling radius](sampling_rank) of radii, none of which may be negative. Numbers
 /// that are not negative have the same order as their bits. So the upper halves of the bits are
 /// counted first, then the lower halves. `counts` is reused memory.
-pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<usize>) -> f32 {
+pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<u32>) -> f32 {
     const HALF: u32 = 16;
-    let mut rank = sampling_rank(radii.len());
+    let mut rank = id32(sampling_rank(radii.len()));
     let mut half_at_rank = |halves: &mut dyn Iterator<Item = u32>| {
         counts.clear();
         counts.resize(1 << HALF, 0);

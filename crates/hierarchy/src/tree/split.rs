@@ -98,10 +98,10 @@ pub(crate) fn split(
 }
 
 /// The number of leaves that [`split_loose`] splits at most together.
-const LEAVES_SPLIT: usize = 16;
+const LEAVES_SPLIT: usize = 8;
 
 /// Orders items that are in a good order for the most part, such as pixels along a curve: where the
-/// points of a leaf `are_loose`, those of the up to sixteen leaves around it are split anew. The first
+/// points of a leaf `are_loose`, those of the up to eight leaves around it are split anew. The first
 /// `dense` items stay before the others, as in [`split`].
 pub(crate) fn split_loose(
     items: &mut [Item],
