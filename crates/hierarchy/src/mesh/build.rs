@@ -15,7 +15,8 @@ use crate::mesh::extents::boxes_of_triangles;
 use crate::mesh::moments::axes_of_nodes;
 use crate::mesh::options::{MeshBuildError, MeshBuildOptions};
 use crate::scan::outline::Ball;
-use crate::tree::split::{Bounds, Item, Parts, split};
+use crate::tree::items::{Bounds, Item, Parts};
+use crate::tree::split::split;
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Root, Siblings, Tree, siblings};
 

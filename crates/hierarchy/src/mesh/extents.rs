@@ -8,7 +8,7 @@ use nearmiss_lanes::parallel::change_each;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::mesh::block::TriangleBlock;
-use crate::tree::split::UPRIGHT;
+use crate::tree::cut::UPRIGHT;
 use crate::tree::topology::Topology;
 
 /// The number of nodes that a thread takes at once.

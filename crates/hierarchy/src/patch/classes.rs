@@ -18,7 +18,7 @@ use nearmiss_store::{Room, WorkError, Workspace};
 
 use crate::patch::surfels::Fit;
 use crate::point::kind::{PointKind, SLAB};
-use crate::tree::split::Item;
+use crate::tree::items::Item;
 
 const WIDTH: usize = PointBlock::WIDTH;
 

@@ -2,14 +2,12 @@
 
 use std::sync::OnceLock;
 
-use bytemuck::bytes_of;
 use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::on_threads;
 use nearmiss_lanes::vector::dot;
 use nearmiss_store::{Array, Workspace};
 use nearmiss_surface::SurfacePlan;
-use xxhash_rust::xxh3::Xxh3;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
@@ -20,7 +18,7 @@ use crate::point::stored_point::StoredPoint;
 use crate::scan::arrays::ScanArrays;
 use crate::scan::data::{Arrays, HierarchyMeta};
 use crate::scan::options::{BuildError, BuildOptions};
-use crate::scan::outline::{Ball, Outline};
+use crate::scan::outline::{Ball, Outline, identity};
 use crate::scan::points::ScanPoints;
 use crate::scan::prepare::{Prepared, prepare};
 use crate::tree::topology::Topology;
@@ -244,22 +242,19 @@ impl PointHierarchy {
 
     /// Computes the hash that identifies this scan, and its bounding balls.
     pub(crate) fn outlined(&self) -> Outline {
-        let arrays = self.arrays();
-        let mut hash = Xxh3::new();
-        let frame = self.frame();
-        hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
-        hash.update(bytes_of(&[self.meta.leaf_size, self.meta.samples, self.meta.dense]));
-        hash.update(bytes_of(&[arrays.sampling_radius, arrays.reach]));
-        hash.update(bytemuck::cast_slice(self.positions()));
-        hash.update(bytemuck::cast_slice(arrays.discs.codes));
-        hash.update(bytemuck::cast_slice(arrays.radii));
+        let (meta, arrays) = (&self.meta, &self.arrays);
         // Coverings are withheld where discs were carried along. Then normals, and with them
         // enclosures, do not follow from the rest.
-        if arrays.coverings.first().is_some_and(|root| root.sampling == f32::INFINITY) {
-            hash.update(bytemuck::cast_slice(arrays.normals));
-        }
+        let is_carried = arrays.coverings.first().is_some_and(|root| root.sampling == f32::INFINITY);
+        let normals = is_carried.then_some(&arrays.normals[..]);
+        self.outlined_as(identity(meta, self.positions(), &arrays.codes, &arrays.radii, normals))
+    }
+
+    /// Computes the bounding balls of this scan.
+    pub(crate) fn outlined_as(&self, identity: u64) -> Outline {
+        let arrays = self.arrays();
         Outline {
-            identity: hash.digest(),
+            identity,
             surface: Ball::about(&arrays.enclosure(0)),
             obstacle: Ball::about(&arrays.obstacle_enclosure(0)),
             discs: Ball::about(&self.meta.root.bounds),

@@ -1,8 +1,6 @@
 //! The last steps of every frame of a scan that moves: support radii, boxes, enclosures and leaf
 //! records of the current points, radii, normals and classes (`docs/theory/moving.md`).
 
-use std::mem::take;
-
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::{both, change_each, fill};
@@ -15,8 +13,10 @@ use crate::patch::covering::Covering;
 use crate::patch::parts::{PartBlock, Parts, bound_parts};
 use crate::point::disc::DiscRadii;
 use crate::point::gather::NeighbourList;
+use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::groups_in_motion;
 use crate::scan::build::PointHierarchy;
+use crate::scan::outline::identity;
 use crate::scan::sampling::quantile;
 use crate::tree::axes::{Spread, principal_axes};
 use crate::tree::topology::Topology;
@@ -94,15 +94,26 @@ impl Closing {
 
     /// Computes everything that depends on boxes.
     pub(crate) fn finish(&self, scan: &mut PointHierarchy) {
-        let (topology, arrays) = (scan.topology, &mut scan.arrays);
-        spacings(&topology, &arrays.radii, arrays.coverings.to_mut());
-        let (mut blocks, mut marks) = (take(&mut arrays.leaf_blocks), take(&mut arrays.marks));
-        let scanned = &*scan;
+        // Unpacks the positions of a scan from a file.
+        let _unpacked = scan.positions();
+        let PointHierarchy { meta, topology, arrays, positions, .. } = scan;
+        let positions: &[[f32; 3]] = positions.get().map_or(&[], |positions| positions);
+        let (normals, codes, radii): (&[_], &[_], &[_]) = (&arrays.normals, &arrays.codes, &arrays.radii);
+        let (reach, sampling_radius) = (meta.reach, meta.sampling_radius);
+        let parts = LeafParts {
+            positions,
+            normals,
+            discs: DiscRadii { codes, radii, reach, sampling_radius },
+            dense: meta.dense as usize,
+        };
         let of_leaf = |leaf: usize| self.boxes[topology.leaf(leaf).index()];
-        let leaves = || scanned.leaf_parts().fill(&topology, of_leaf, (blocks.to_mut(), marks.to_mut()));
-        let (outline, ()) = both(|| scanned.outlined(), leaves);
-        (scan.arrays.leaf_blocks, scan.arrays.marks) = (blocks, marks);
-        scan.meta.outline = outline;
+        let leaves = (arrays.leaf_blocks.to_mut(), arrays.marks.to_mut());
+        let (identity, ()) = both(
+            || identity(meta, positions, codes, radii, Some(normals)),
+            || parts.fill(topology, of_leaf, leaves),
+        );
+        spacings(topology, radii, arrays.coverings.to_mut());
+        scan.meta.outline = scan.outlined_as(identity);
     }
 }
 

@@ -18,7 +18,8 @@ use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::points::ScanPoints;
 use crate::scan::sampling::{Sampling, set_reaches};
 use crate::scan::share;
-use crate::tree::split::{Item, Parts, bound_in_order, split};
+use crate::tree::items::{Item, Parts};
+use crate::tree::split::{bound_in_order, split};
 use crate::tree::topology::Topology;
 use crate::tree::wide::Bare;
 

@@ -20,7 +20,8 @@ use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::points::step;
 use crate::scan::refit::LEAST_RADIUS;
 use crate::scan::sampling::{check_reach, quantile, reach_of};
-use crate::tree::split::{Item, split_loose};
+use crate::tree::items::Item;
+use crate::tree::split::split_loose;
 use crate::tree::topology::Topology;
 
 /// The share of points without K neighbours among the pixels around from which pixels do not tell

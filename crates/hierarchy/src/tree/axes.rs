@@ -103,7 +103,8 @@ mod tests {
     use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 
     use super::*;
-    use crate::tree::split::{Item, bound_in_order};
+    use crate::tree::items::Item;
+    use crate::tree::split::bound_in_order;
 
     #[test]
     fn axes_from_moments_span_boxes_as_small_as_axes_from_points() {

@@ -181,19 +181,36 @@ fn a_scan_at_rest_keeps_its_discs_and_a_renewed_one_equals_a_prepared_one() {
 
 #[test]
 fn replaced_points_are_fitted_as_prepared_ones() {
-    let mut found = 0;
-    for (kind, points, size) in clouds() {
+    let (mut found, mut among) = (0, 0);
+    let (kind, mut strays, size) = clouds().swap_remove(0);
+    strays.extend((2..8_u8).map(|i| [0.0, size * f64::from(i), 0.3 * size]));
+    for (kind, points, size) in clouds().into_iter().chain([(kind, strays, 8.0 * size)]) {
         let Ok(mut scan) = DeformingScan::new(&points, &BuildOptions::default()) else { continue };
         let shear = &frames(&points[10..], size, 4)[2].1;
         let Ok(anew) = DeformingScan::new(shear, &BuildOptions::default()) else { continue };
         scan.replace(shear).unwrap();
         assert_eq!(scan.sanity_check(), Ok(()), "{kind:?}");
-        assert_eq!(scan.source(), anew.source(), "{kind:?}");
-        assert_eq!((scan.radii(), scan.normals()), (anew.radii(), anew.normals()), "{kind:?}");
-        assert!(scan.discs().iter().eq(anew.discs().iter()), "{kind:?}");
+        if scan.source() == anew.source() {
+            assert_eq!((scan.radii(), scan.normals()), (anew.radii(), anew.normals()), "{kind:?}");
+        } else {
+            // Few sparse points stay among the others; in a prepared scan they come last.
+            let sparse = (0..scan.len()).filter(|i| scan.kind(*i).is_sparse()).count();
+            assert!((1..=scan.len() / 100).contains(&sparse), "{kind:?}: {sparse} of {}", scan.len());
+            among += 1;
+        }
+        let by_input = |scan: &DeformingScan| {
+            let point = |i: usize| (scan.source()[i], scan.radii()[i], scan.discs().get(i), scan.kind(i));
+            let mut all: Vec<_> = (0..scan.len()).map(point).collect();
+            all.sort_by_key(|point| point.0);
+            all
+        };
+        assert_eq!(by_input(&scan), by_input(&anew), "{kind:?}");
         found += check_enclosed(&scan, 5, "replaced")[0];
     }
-    assert!(found > 2000, "{found} places of surfaces");
+    assert!(
+        found > 2000 && among > 0,
+        "{found} places of surfaces, {among} scans with sparse points among others"
+    );
 }
 
 /// A scene as a depth camera sees it: a wall, a floor, two balls before them, holes and noise.
