@@ -10,6 +10,7 @@ pub(crate) mod data;
 pub(crate) mod deform_error;
 pub(crate) mod deforming;
 pub(crate) mod evaluate;
+pub(crate) mod identity;
 pub(crate) mod intake;
 pub(crate) mod levels;
 pub(crate) mod metric;

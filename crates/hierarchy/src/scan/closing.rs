@@ -16,7 +16,7 @@ use crate::point::gather::NeighbourList;
 use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::groups_in_motion;
 use crate::scan::build::PointHierarchy;
-use crate::scan::outline::identity;
+use crate::scan::identity::identity;
 use crate::scan::sampling::quantile;
 use crate::tree::axes::{Spread, principal_axes};
 use crate::tree::topology::Topology;
