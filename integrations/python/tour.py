@@ -14,7 +14,7 @@ if len(sys.argv) < 2:
 scan = nearmiss.Scan.read(sys.argv[1], progress=lambda share: print(f"\rpreparing {share:4.0%}", end=""))
 scan.save("tour.nm")
 scan = nearmiss.Scan.open("tour.nm", check="structure")
-print("\n", scan, "bounds", scan.bounds.tolist())
+print(f"\n{scan} bounds {scan.bounds.tolist()}")
 
 # Does it touch a copy of itself, moved along x? A pose is a 4×4 array.
 size = float(np.ptp(scan.bounds, axis=0).max())

@@ -33,7 +33,9 @@ fn set_up(mut commands: Commands, server: Res<AssetServer>) {
     let room = ScanCollider(server.load("room.ply"));
     commands.spawn((room, upright, ScanGizmos { points: 20_000, ..ScanGizmos::default() }));
     let probe = ScanCollider(server.load("probe.nm"));
-    commands.spawn((probe, ScanGizmos::default(), Transform::from_xyz(2.0, 1.5, -2.0), Probe));
+    // Few points, so that contacts show through.
+    let few = ScanGizmos { points: 300, ..ScanGizmos::default() };
+    commands.spawn((probe, few, Transform::from_xyz(2.0, 1.5, -2.0), Probe));
 }
 
 fn move_probe(
