@@ -81,6 +81,10 @@ const MOST_GROUPS: u32 = 8;
 /// Number of records of a group that are written at once: 64 KiB.
 const RUN: usize = 1 << 12;
 
+/// The greatest number of records that are put into a hash table. A group is larger if many points are
+/// at one place, or in clouds of some hundred million points.
+const MOST_HASHED: usize = 1 << 20;
+
 /// Number of places of a hash table that are tried for a record. The table is at most half full, so more
 /// are needed only if many hashes are alike.
 const MOST_TRIES: usize = 64;
@@ -90,7 +94,7 @@ impl Repeated {
     ///
     /// `records` is scratch memory with one element for each point. It may be larger than main
     /// memory: it is written in runs of 64 KiB, and then searched group by group. Takes O(n)
-    /// time, or O(n log n) where many hashes are alike, and some 20 MiB.
+    /// time, or O(n log n) where many hashes are alike, and some 24 MiB.
     ///
     /// # Panics
     /// Panics if `records` is shorter than `points`.
@@ -142,18 +146,18 @@ impl Repeated {
     /// Adds the points of `records` that repeat an earlier point. Indices ascend. `table` is reused
     /// memory.
     fn find(&mut self, records: &mut [u128], table: &mut Vec<u32>) {
-        if u32::try_from(records.len()).is_err() || !self.find_by_hash(records, table) {
+        if records.len() > MOST_HASHED || !self.find_by_hash(records, table) {
             self.find_by_order(records);
         }
     }
 
-    /// Finds them in O(n). Returns `false`, and adds none, if hashes that are alike make that slow.
+    /// Finds them in O(n). Returns `false`, and may have added only some, if hashes that are alike make
+    /// that slow.
     fn find_by_hash(&mut self, records: &[u128], table: &mut Vec<u32>) -> bool {
         const FREE: u32 = u32::MAX;
         let mask = (2 * records.len()).next_power_of_two() - 1;
         table.clear();
         table.resize(mask + 1, FREE);
-        let mut found = Vec::new();
         for (number, record) in (0_u32..).zip(records) {
             #[expect(clippy::cast_possible_truncation, reason = "the lowest bits of the hash")]
             let first = (record >> 64) as usize & mask;
@@ -165,10 +169,9 @@ impl Repeated {
             match places.into_iter().find(is_known) {
                 None => return false,
                 Some(place) if table[place] == FREE => table[place] = number,
-                Some(_) => found.push(*record),
+                Some(_) => self.add(*record),
             }
         }
-        found.into_iter().for_each(|record| self.add(record));
         true
     }
 
@@ -183,11 +186,12 @@ impl Repeated {
         }
     }
 
+    /// Adds the point of a record; nothing if it has been added before.
     #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
     fn add(&mut self, record: u128) {
         let i = record as u32 as usize;
+        self.count += usize::from(!self.contains(i));
         self.bits[i / 64] |= 1 << (i % 64);
-        self.count += 1;
     }
 
     /// Returns `true` if point `i` repeats an earlier point.
@@ -260,7 +264,6 @@ mod tests {
             (0..200_u32).map(|i| 7 << 64 | u128::from(i % 100) << 32 | u128::from(i)).collect();
         let mut found = Repeated::none(200);
         assert!(!found.find_by_hash(&records, &mut Vec::new()), "too many of one hash");
-        assert_eq!(found.count(), 0);
         found.find(&mut records, &mut Vec::new());
         assert!((0..200).all(|i| found.contains(i) == (i >= 100)));
         assert_eq!(found.count(), 100);
