@@ -12,6 +12,7 @@ pub(crate) mod distance;
 pub(crate) mod elements;
 pub(crate) mod gather;
 pub(crate) mod hint;
+pub(crate) mod inner;
 pub(crate) mod lanes;
 pub(crate) mod meeting;
 pub(crate) mod place;

@@ -1,8 +1,8 @@
 //! `mesh-collide`: tests whether two meshes meet, and where.
 
 use nearmiss::{
-    MeshAnswer, MeshContact, MeshDistance, MeshPair, MeshPenetration, MeshQuality, MeshScratch, MeshSolid,
-    MeshVerdict, Pose, Scratch,
+    MeshAnswer, MeshContact, MeshDistance, MeshPair, MeshQuality, MeshScratch, MeshSolid, MeshVerdict,
+    Penetration, Pose, Scratch,
 };
 use nearmiss_draw::picture::Picture;
 
@@ -46,7 +46,7 @@ struct Asked {
     /// The distance, if it was computed.
     clearance: Option<MeshDistance>,
     /// The penetration, with `--penetration`.
-    penetration: Option<MeshPenetration>,
+    penetration: Option<Penetration>,
     micros: f64,
 }
 

@@ -1,6 +1,6 @@
 //! The penetration of two meshes, for scripts and for people.
 
-use nearmiss::MeshPenetration;
+use nearmiss::Penetration;
 use serde::Serialize;
 
 use crate::digits::{rounded, rounded_down};
@@ -19,7 +19,7 @@ pub(crate) struct PenetrationReport {
 
 impl PenetrationReport {
     /// Creates the report; `None` for meshes that are separate, and for invalid poses.
-    pub(crate) fn new(found: &MeshPenetration) -> Option<Self> {
+    pub(crate) fn new(found: &Penetration) -> Option<Self> {
         overlaps(found).then(|| Self {
             lower: found.lower,
             upper: found.upper,
@@ -30,13 +30,13 @@ impl PenetrationReport {
 }
 
 /// Returns `true` if the meshes may overlap.
-fn overlaps(found: &MeshPenetration) -> bool {
+fn overlaps(found: &Penetration) -> bool {
     found.upper > 0.0 && found.upper.is_finite()
 }
 
 /// Returns the penetration as a sentence; `None` for meshes that are separate, and for invalid
 /// poses. The lower bound is rounded down, the upper one up.
-pub(crate) fn penetration_sentence(found: &MeshPenetration, unit: f64) -> Option<String> {
+pub(crate) fn penetration_sentence(found: &Penetration, unit: f64) -> Option<String> {
     if !overlaps(found) {
         return None;
     }

@@ -1,6 +1,6 @@
 //! Prepared meshes and answers about them, as JSON and as text.
 
-use nearmiss::{ContactRegion, Mesh, MeshAnswer, MeshDistance, MeshPenetration, MeshVerdict};
+use nearmiss::{ContactRegion, Mesh, MeshAnswer, MeshDistance, MeshVerdict, Penetration};
 use serde::Serialize;
 
 use super::contacts::{MeshClashReport, MeshContactReport, MeshContacts};
@@ -97,7 +97,7 @@ impl MeshAnswerReport {
     pub(crate) fn new(
         answer: &MeshAnswer,
         all: Option<(&MeshContacts<'_>, bool)>,
-        penetration: Option<&MeshPenetration>,
+        penetration: Option<&Penetration>,
         micros: f64,
     ) -> Self {
         let contact = match answer.verdict {

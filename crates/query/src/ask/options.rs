@@ -440,6 +440,15 @@ impl CollidePlan {
         }
     }
 
+    /// The plan of a search that only asks whether the scans meet, by the default method.
+    pub(crate) fn of_verdicts(&self) -> Self {
+        let Self { options } = self;
+        let options = CollideOptions { evidence: Evidence::Estimated, detail: Detail::Verdict, ..*options };
+        Self {
+            options: CollideOptions { method: Method::Traversal, order: None, coverings: false, ..options },
+        }
+    }
+
     /// The same plan with other test points, which must be in range.
     pub(crate) fn with_sampling(self, sampling: Sampling) -> Self {
         Self { options: self.options.with_method(Method::Sampling(sampling)) }

@@ -11,12 +11,14 @@ use crate::mesh::collide::collide;
 use crate::mesh::distance::{MeshDistance, distance};
 use crate::mesh::hint::MeshHint;
 use crate::mesh::mesh_pair::MeshPairing;
-use crate::mesh::penetration::{MeshPenetration, PenetrationScratch, penetration};
+use crate::mesh::penetration::penetration;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::quality::MeshQuality;
 use crate::mesh::solid::MeshSolid;
 use crate::mesh::time_critical;
 use crate::pair::cell_table::{CellTable, MOST_SHARED};
+use crate::penetration::answer::Penetration;
+use crate::penetration::survey::ContactSurvey;
 
 /// Working memory of queries about meshes, one per thread. Reuse it: a query does not allocate once
 /// its scratch is warm. It holds no answers and never changes one.
@@ -29,7 +31,7 @@ pub struct MeshScratch {
     /// The pairs that are open when a time-critical search stops.
     left: Vec<Open>,
     table: Option<CellTable>,
-    penetration: PenetrationScratch,
+    penetration: ContactSurvey,
 }
 
 impl Default for MeshScratch {
@@ -50,7 +52,7 @@ impl MeshScratch {
             heap: Heap::default(),
             left: Vec::new(),
             table: None,
-            penetration: PenetrationScratch::default(),
+            penetration: ContactSurvey::default(),
         }
     }
 
@@ -185,7 +187,7 @@ impl<'a> MeshPair<'a> {
     /// faces or round parts overlap a little, and further below at corners, edges and deep overlaps.
     ///
     /// Costs 300 to 1000 boolean queries without a budget. Does not allocate once `scratch` is warm.
-    pub fn penetration(&self, solids: [&MeshSolid; 2], scratch: &mut MeshScratch) -> MeshPenetration {
+    pub fn penetration(&self, solids: [&MeshSolid; 2], scratch: &mut MeshScratch) -> Penetration {
         let MeshScratch { level, stack, penetration: own, .. } = scratch;
         penetration(self.meshes, solids, &self.budget, (*level, stack), own)
     }

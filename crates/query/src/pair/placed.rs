@@ -46,6 +46,13 @@ impl<'a> Placed<'a> {
         Self { stored_to_world: Self::new(self.scan, pose).stored_to_world, ..*self }
     }
 
+    /// The same placed scan, shifted by `t` in the world.
+    pub(crate) fn shifted(&self, t: [f64; 3]) -> Self {
+        let pose = &self.stored_to_world;
+        let [x, y, z] = pose.translation();
+        Self { stored_to_world: pose.with_translation([x + t[0], y + t[1], z + t[2]]), ..*self }
+    }
+
     /// The same placed scan with its graph, for the geodesic kernel and for searches along the graph.
     #[inline]
     #[must_use]

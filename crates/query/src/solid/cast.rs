@@ -135,6 +135,25 @@ pub(crate) fn crossings(
     evidence
 }
 
+/// Calls `each` with all places where a ray hits the scan, the nearest first: one for each sheet that it
+/// crosses, and for each ball. `found` is working memory.
+pub(crate) fn all_hits(
+    elements: &Elements<'_>,
+    ray: &StoredRay,
+    (level, found, scratch): (Level, &mut Vec<Crossing>, &mut ViewScratch),
+    mut each: impl FnMut(RayHit),
+) {
+    let _evidence = crossings(elements, ray, Wanted::All, (level, &mut *found));
+    let (mut next, mut last) = (0, f64::NEG_INFINITY);
+    while let Some((hit, layer)) = next_hit(elements, ray, found, &mut next, scratch) {
+        // Crossings of one sheet may end at the same place once they are moved onto the surface.
+        if hit.t - last > layer {
+            last = hit.t;
+            each(hit);
+        }
+    }
+}
+
 /// Returns the first of the crossings from number `next` on that counts, as a hit, and the thickness of
 /// the sheet there in the world; sets `next` to the crossing after those of the same sheet.
 pub(crate) fn next_hit(

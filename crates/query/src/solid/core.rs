@@ -6,6 +6,7 @@ use nearmiss_mesh::nearest_on_triangle;
 
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::closest::{Closest, closest};
+use crate::solid::inner::inner_depth;
 use crate::solid::shape::{Shape, SupportMap};
 
 type Vector = Vector3<f64>;
@@ -21,8 +22,10 @@ enum Core<'a> {
     /// A truncated cone about the second axis of the bounding box, with these radii below and above.
     Round([f64; 2]),
     Triangle([Vector; 3]),
-    Hull(&'a [[f64; 3]], &'a Pose),
-    Own(&'a dyn SupportMap, &'a Pose),
+    /// Places in the world, the stored frame in the world, and a shift in the stored frame.
+    Hull(&'a [[f64; 3]], &'a Pose, Vector),
+    /// Likewise.
+    Own(&'a dyn SupportMap, &'a Pose, Vector),
 }
 
 /// A convex shape in the stored frame of a scan.
@@ -115,10 +118,10 @@ impl<'a> Solid<'a> {
             Shape::Hull { points, .. } => {
                 let of = |d: &Vector| extreme(points.iter().map(|&p| into(p)), d);
                 let (centre, half) = spanned(&upright, of);
-                (Core::Hull(points, placed), centre, upright, half)
+                (Core::Hull(points, placed, Vector::zeros()), centre, upright, half)
             }
             Shape::Own { map, .. } => {
-                let core = Core::Own(map, placed);
+                let core = Core::Own(map, placed, Vector::zeros());
                 let probe = Self {
                     core,
                     radius,
@@ -144,6 +147,12 @@ impl<'a> Solid<'a> {
         };
         let is_finite = [centre, half, inside].iter().all(|v| v.iter().all(|c| c.is_finite()));
         (is_finite && radius.is_finite()).then_some(Self { core, radius, centre, axes, half, inside })
+    }
+
+    /// A single place of the stored frame.
+    pub(crate) fn point(place: Vector) -> Self {
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        Self { core: Core::Point, radius: 0.0, centre: place, axes, half: Vector::zeros(), inside: place }
     }
 
     /// Returns `true` if distances of the core from points are those of its bounding box.
@@ -272,12 +281,14 @@ impl<'a> Solid<'a> {
                 if d.dot(&(high - low)) > 0.0 { high } else { low }
             }
             Core::Triangle(corners) => extreme(corners.into_iter(), d),
-            Core::Hull(points, placed) => {
+            Core::Hull(points, placed, shift) => {
                 let towards = Vector::from(placed.rotate((*d).into()));
                 let furthest = extreme(points.iter().map(|&p| Vector::from(p)), &towards);
-                placed.apply_inverse(furthest.into()).into()
+                Vector::from(placed.apply_inverse(furthest.into())) + shift
             }
-            Core::Own(map, placed) => placed.apply_inverse(map.support(placed.rotate((*d).into()))).into(),
+            Core::Own(map, placed, shift) => {
+                Vector::from(placed.apply_inverse(map.support(placed.rotate((*d).into())))) + shift
+            }
         }
     }
 
@@ -305,6 +316,37 @@ impl<'a> Solid<'a> {
                 x + closest(support, self.inside - x, f64::INFINITY).points[0]
             }
         }
+    }
+
+    /// The same shape shifted by `t`.
+    pub(crate) fn shifted(&self, t: &Vector) -> Self {
+        let core = match self.core {
+            Core::Triangle(corners) => Core::Triangle(corners.map(|corner| corner + t)),
+            Core::Hull(points, placed, before) => Core::Hull(points, placed, before + t),
+            Core::Own(map, placed, before) => Core::Own(map, placed, before + t),
+            other => other,
+        };
+        Self { core, centre: self.centre + t, inside: self.inside + t, ..*self }
+    }
+
+    /// How far `x` is inside the shape: a lower bound of its distance from the boundary, and the direction
+    /// away from there. `None` if it is outside.
+    pub(crate) fn depth(&self, x: &Vector) -> Option<(f64, Vector)> {
+        let on_core = self.nearest(x);
+        let away = x - on_core;
+        let distance = away.norm();
+        // On the core, up to rounding.
+        if distance > 1e-12 * (self.half.norm() + self.radius) {
+            return (distance < self.radius).then(|| (self.radius - distance, -away / distance));
+        }
+        let (depth, out) = match self.core {
+            Core::Point | Core::Segment | Core::Triangle(_) => (0.0, Vector::zeros()),
+            Core::Box | Core::Round(_) | Core::Hull(..) | Core::Own(..) => {
+                let scale = self.half.amax();
+                inner_depth(|d| self.support(d) - x, scale)
+            }
+        };
+        (self.radius + depth > 0.0).then_some((self.radius + depth, -out))
     }
 
     /// The distance of `x` from the core.

@@ -125,6 +125,11 @@ impl<'a> Elements<'a> {
         }
     }
 
+    /// The same, with which nothing evaluates the implicit function.
+    pub(crate) fn without_witness(&self) -> Self {
+        Self { detail: Detail::Verdict, ..*self }
+    }
+
     pub(crate) fn scale(&self) -> f64 {
         self.placed.stored_to_world().scale()
     }

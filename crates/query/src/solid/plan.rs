@@ -1,8 +1,10 @@
 //! Validated options for a scan and convex shapes.
 
 use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_surface::Metric;
 
-use crate::ask::options::{CollideOptions, CollidePlan, Method, PlanError};
+use crate::ask::answer::Evidence;
+use crate::ask::options::{CollideOptions, CollidePlan, Detail, Method, PlanError};
 
 /// A validated question about a scan and [shapes](crate::Shape) or [rays](crate::Ray). It serves
 /// every scan of the same [metric](PointHierarchy::metric), in any pose.
@@ -33,6 +35,15 @@ impl ShapePlan {
             return Err(PlanError::NotForShapes(what));
         }
         Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
+    }
+
+    /// A plan for one scan of a pair, with its meaning of contact. Distances are proven if the metric allows
+    /// it, and nothing evaluates the implicit function.
+    pub(crate) fn of_pair(plan: &CollidePlan) -> Self {
+        let options = plan.options().with_detail(Detail::Verdict);
+        let is_proven = options.metric != Some(Metric::Geodesic);
+        let evidence = if is_proven { Evidence::Certified } else { Evidence::Estimated };
+        Self { options: CollideOptions { evidence, ..options } }
     }
 
     /// The options that were validated, with the metric of the scan.

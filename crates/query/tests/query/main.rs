@@ -22,6 +22,7 @@ mod orders;
 mod outputs;
 mod penetration;
 mod rays;
+mod scan_penetration;
 mod shapes;
 mod solid_contacts;
 mod solid_sweeps;

@@ -4,7 +4,7 @@ use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
 use nearmiss_geometry::{Pose, TriangleMesh};
 use nearmiss_hierarchy::{MeshBuildOptions, MeshHierarchy};
 use nearmiss_mesh::triangles_meet;
-use nearmiss_query::{Budget, MeshPair, MeshPenetration, MeshScratch, MeshSolid, PlacedMesh};
+use nearmiss_query::{Budget, MeshPair, MeshScratch, MeshSolid, Penetration, PlacedMesh};
 use nearmiss_testdata::arbitrary::{point_in, pose, rng, unit_vector};
 use rand::RngExt;
 
@@ -17,7 +17,7 @@ fn prepare(mesh: &TriangleMesh) -> (MeshHierarchy, MeshSolid) {
     (prepared, solid)
 }
 
-fn ask(meshes: [&TriangleMesh; 2], poses: [Pose; 2], budget: &Budget) -> MeshPenetration {
+fn ask(meshes: [&TriangleMesh; 2], poses: [Pose; 2], budget: &Budget) -> Penetration {
     let [(a, solid_a), (b, solid_b)] = meshes.map(prepare);
     let pair = MeshPair::new(PlacedMesh::new(&a, &poses[0]), PlacedMesh::new(&b, &poses[1])).within(budget);
     pair.penetration([&solid_a, &solid_b], &mut MeshScratch::default())
@@ -28,7 +28,7 @@ fn shifted(pose: &Pose, t: Vector) -> Pose {
     pose.with_translation((Vector::from(pose.translation()) + t).into())
 }
 
-fn apart(pose: &Pose, found: &MeshPenetration) -> Pose {
+fn apart(pose: &Pose, found: &Penetration) -> Pose {
     shifted(pose, Vector::from(found.direction) * found.upper)
 }
 

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 use nearmiss_geometry::Pose;
-use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{MeshView, Stack};
 
 use crate::ask::answer::Statistics;
@@ -12,16 +11,16 @@ use crate::ask::budget::Budget;
 use crate::mesh::collide::first_met;
 use crate::mesh::foot::foot;
 use crate::mesh::mesh_pair::MeshPairing;
-use crate::mesh::penetration::contacts::ContactSurvey;
+use crate::mesh::penetration::contacts::survey;
 use crate::mesh::penetration::triangle_depth::triangle_depth;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::{MeshSolid, SolidView};
-
-pub(crate) type Vector = Vector3<f64>;
+use crate::penetration::probe::{Deep, Probe, Vector};
+use crate::penetration::survey::ContactSurvey;
 
 /// Two placed meshes with their solids, and the cost of all tests so far. Shifts are those of b, in
 /// the world.
-pub(crate) struct Probe<'s> {
+pub(crate) struct MeshProbe<'s> {
     meshes: [PlacedMesh<'s>; 2],
     views: &'s [MeshView<'s>; 2],
     solids: [&'s MeshSolid; 2],
@@ -31,7 +30,7 @@ pub(crate) struct Probe<'s> {
     pub(crate) spent: Statistics,
 }
 
-impl<'s> Probe<'s> {
+impl<'s> MeshProbe<'s> {
     pub(crate) fn new(
         meshes: [PlacedMesh<'s>; 2],
         views: &'s [MeshView<'s>; 2],
@@ -96,42 +95,6 @@ impl<'s> Probe<'s> {
         None
     }
 
-    /// Returns a place where the surfaces meet after a shift, and the direction in which the
-    /// triangles there are separated soonest; `None` if the surfaces do not meet. Breaks if the
-    /// budget ended the search.
-    pub(crate) fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
-        let meshes = self.shifted(t);
-        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
-        let (flow, met) = first_met(&mut pair, self.stack);
-        self.spend(&pair.meter.spent);
-        let Some(met) = met else { return flow.map_continue(|()| None) };
-        let [a, b] = pair.corners(met);
-        let pose = pair.meshes[0].pose();
-        let place = pair.contact(met).map_or(pose.apply(a[0]), |contact| contact.point);
-        let way = pose.rotate(triangle_depth(&a, &b).1.into());
-        ControlFlow::Continue(Some((place.into(), way.into())))
-    }
-
-    /// Returns `true` if the solids have no point in common after a shift. Breaks if the budget ended
-    /// the search.
-    ///
-    /// If no triangles meet, each part of a mesh is inside or outside of the other solid as a whole.
-    pub(crate) fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
-        let meshes = self.shifted(t);
-        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
-        let are_balls_apart = pair.gap > 0.0;
-        let (flow, met) = first_met(&mut pair, self.stack);
-        self.spend(&pair.meter.spent);
-        if met.is_some() {
-            return ControlFlow::Continue(false);
-        }
-        flow?;
-        let poses = [*self.meshes[0].pose(), self.pose_of_b(t)];
-        let is_nested =
-            !are_balls_apart && (self.has_part_inside(0, &poses) || self.has_part_inside(1, &poses));
-        ControlFlow::Continue(!is_nested)
-    }
-
     /// Returns `true` if a part of the other mesh begins inside the solid of mesh `k`.
     fn has_part_inside(&mut self, k: usize, poses: &[Pose; 2]) -> bool {
         let Some(outer) = self.solid(k) else { return false };
@@ -147,47 +110,87 @@ impl<'s> Probe<'s> {
         let solid = Some(self.solids[k]).filter(|solid| solid.is_closed())?;
         Some(SolidView { mesh: self.meshes[k].mesh(), view: &self.views[k], solid, level: self.level })
     }
+}
 
-    /// Returns the feet of a place, without a shift, on both surfaces; `None` unless the place is
-    /// inside both solids. Breaks if the budget is spent.
-    pub(crate) fn feet(&mut self, place: Vector) -> ControlFlow<(), Option<[Vector; 2]>> {
+impl Probe for MeshProbe<'_> {
+    /// The direction is that in which the two triangles there are separated soonest.
+    fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
+        let meshes = self.shifted(t);
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
+        let (flow, met) = first_met(&mut pair, self.stack);
+        self.spend(&pair.meter.spent);
+        let Some(met) = met else { return flow.map_continue(|()| None) };
+        let [a, b] = pair.corners(met);
+        let pose = pair.meshes[0].pose();
+        let place = pair.contact(met).map_or(pose.apply(a[0]), |contact| contact.point);
+        let way = pose.rotate(triangle_depth(&a, &b).1.into());
+        ControlFlow::Continue(Some((place.into(), way.into())))
+    }
+
+    /// If no triangles meet, each part of a mesh is inside or outside of the other solid as a whole.
+    fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
+        let meshes = self.shifted(t);
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
+        let are_balls_apart = pair.gap > 0.0;
+        let (flow, met) = first_met(&mut pair, self.stack);
+        self.spend(&pair.meter.spent);
+        if met.is_some() {
+            return ControlFlow::Continue(false);
+        }
+        flow?;
+        let poses = [*self.meshes[0].pose(), self.pose_of_b(t)];
+        let is_nested =
+            !are_balls_apart && (self.has_part_inside(0, &poses) || self.has_part_inside(1, &poses));
+        ControlFlow::Continue(!is_nested)
+    }
+
+    fn survey(&mut self, found: &mut ContactSurvey) -> ControlFlow<()> {
+        let meshes = self.meshes;
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
+        let flow = survey(&mut pair, self.stack, found);
+        self.spend(&pair.meter.spent);
+        flow
+    }
+
+    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
         let (Some(a), Some(b)) = (self.solid(0), self.solid(1)) else { return ControlFlow::Continue(None) };
         let meshes = self.meshes;
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         pair.meter.go_on()?;
         self.spent.evaluations += 1;
-        let mut feet = [Vector::zeros(); 2];
+        let mut found = Deep { place, depth: 0.0, uphill: Vector::zeros() };
         for (k, solid) in [a, b].iter().enumerate() {
             let pose = self.meshes[k].pose();
             let own = pose.apply_inverse(place.into());
             if !solid.contains(own) {
                 return ControlFlow::Continue(None);
             }
-            feet[k] = pose.apply(foot(solid.mesh, solid.view, self.level, own)).into();
+            let away = place - Vector::from(pose.apply(foot(solid.mesh, solid.view, self.level, own)));
+            found.depth += away.norm();
+            found.uphill += away.try_normalize(0.0).unwrap_or_else(Vector::zeros);
         }
-        ControlFlow::Continue(Some(feet))
+        ControlFlow::Continue(Some(found))
     }
 
-    /// Returns the centres of both root boxes.
-    pub(crate) fn centres(&self) -> [Vector; 2] {
+    fn centres(&self) -> [Vector; 2] {
         [0, 1].map(|k| {
             let centre = self.views[k].tree.root_box().centre.map(f64::from);
             self.meshes[k].stored_to_world().apply(centre).into()
         })
     }
 
-    /// Returns the direction of b's centre from a's, and the axes of both root boxes.
-    pub(crate) fn axes(&self) -> [Vector; 7] {
-        let axes = |k: usize| {
+    fn axes(&self) -> [[Vector; 3]; 2] {
+        [0, 1].map(|k| {
             let placed = self.meshes[k].stored_to_world();
             self.views[k].tree.root_box().axes.map(|axis| Vector::from(placed.rotate(axis.map(f64::from))))
-        };
-        let ([a, b], [u, v, w], [x, y, z]) = (self.centres(), axes(0), axes(1));
-        [b - a, u, v, w, x, y, z]
+        })
     }
 
-    /// Returns a bound of the rounding error of lengths in the world.
-    pub(crate) fn rounding(&self) -> f64 {
+    fn slack(&self) -> f64 {
+        0.0
+    }
+
+    fn rounding(&self) -> f64 {
         let far = |k: usize| {
             let (mesh, pose) = (self.meshes[k].mesh(), self.meshes[k].pose());
             let extent =
@@ -195,14 +198,5 @@ impl<'s> Probe<'s> {
             pose.scale() * extent + Vector::from(pose.translation()).amax()
         };
         1e-13 * (far(0) + far(1))
-    }
-
-    /// Finds all contacts without a shift. Breaks if the budget ended the search.
-    pub(crate) fn contacts(&mut self, contacts: &mut ContactSurvey) -> ControlFlow<()> {
-        let meshes = self.meshes;
-        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
-        let flow = contacts.find(&mut pair, self.stack);
-        self.spend(&pair.meter.spent);
-        flow
     }
 }

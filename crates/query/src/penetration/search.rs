@@ -1,29 +1,54 @@
-//! The search for a short shift that separates two solids.
+//! The search for a short shift that separates two things.
 
 use std::ops::ControlFlow;
 
-use crate::mesh::penetration::contacts::{ContactSurvey, KEPT};
-use crate::mesh::penetration::deepest::deepen;
-use crate::mesh::penetration::probe::{Probe, Vector};
+use crate::penetration::deepest::climb;
+use crate::penetration::probe::{Deep, Probe, Vector};
+use crate::penetration::survey::{ContactSurvey, KEPT};
 
-/// A shift that was found to separate the solids.
+/// Bounds of the least shift that separates two things.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shift {
+pub(crate) struct Bounds {
+    /// A lower bound of its length.
+    pub(crate) lower: f64,
+    /// A shift that separates them.
+    pub(crate) shift: Vector,
+    /// `true` if the search ended by itself.
+    pub(crate) complete: bool,
+}
+
+/// Bounds the least shift that separates two things. `out` is any shift that does.
+pub(crate) fn search<P: Probe>(probe: &mut P, out: Vector, contacts: &mut ContactSurvey) -> Bounds {
+    let mut search = Search { probe, contacts, best: Shift::new(out), lower: 0.0 };
+    let flow = match search.probe.is_apart(Vector::zeros()) {
+        ControlFlow::Continue(true) => {
+            return Bounds { lower: 0.0, shift: Vector::zeros(), complete: true };
+        }
+        ControlFlow::Continue(false) => search.narrow(),
+        ControlFlow::Break(()) => ControlFlow::Break(()),
+    };
+    let Search { best, lower, .. } = search;
+    Bounds { lower: lower.min(best.length), shift: best.vector(), complete: flow.is_continue() }
+}
+
+/// A shift that was found to separate the things.
+#[derive(Debug, Clone, Copy)]
+struct Shift {
     /// A unit vector.
-    pub(crate) way: Vector,
-    pub(crate) length: f64,
+    way: Vector,
+    length: f64,
     /// A shorter length at which the solids were found to meet.
     meets: f64,
 }
 
 impl Shift {
     /// The shift by `t`.
-    pub(crate) fn new(t: Vector) -> Self {
+    fn new(t: Vector) -> Self {
         Self { way: t.try_normalize(0.0).unwrap_or_else(Vector::x), length: t.norm(), meets: 0.0 }
     }
 
     /// Returns the shift as a vector.
-    pub(crate) fn vector(&self) -> Vector {
+    fn vector(&self) -> Vector {
         self.way * self.length
     }
 }
@@ -47,20 +72,26 @@ const TURNS: usize = 32;
 /// middle is best for a shallow overlap. A small solid deep inside another one is near an end.
 const WAYS_BACK: [f64; 5] = [0.5, 0.9, 0.1, 0.98, 0.02];
 
+/// The number of those places, and of others.
+const STARTS: usize = 3 * WAYS_BACK.len() + 1;
+
+/// The number of places from which deeper ones are looked for.
+const CLIMBS: usize = 2;
+
 /// A search, and its results so far, which hold whenever it is ended.
-pub(crate) struct Search<'p, 's> {
-    pub(crate) probe: &'p mut Probe<'s>,
-    pub(crate) contacts: &'p mut ContactSurvey,
+struct Search<'p, P> {
+    probe: &'p mut P,
+    contacts: &'p mut ContactSurvey,
     /// The best shift so far.
-    pub(crate) best: Shift,
+    best: Shift,
     /// The greatest lower bound so far.
-    pub(crate) lower: f64,
+    lower: f64,
 }
 
-impl Search<'_, '_> {
-    /// Shortens the shift and raises the lower bound of solids that meet. Breaks if the budget ends.
-    pub(crate) fn narrow(&mut self) -> ControlFlow<()> {
-        self.probe.contacts(self.contacts)?;
+impl<P: Probe> Search<'_, P> {
+    /// Shortens the shift and raises the lower bound of things that meet. Breaks if the budget ends.
+    fn narrow(&mut self) -> ControlFlow<()> {
+        self.probe.survey(self.contacts)?;
         self.lower = self.lower.max(self.contacts.least - self.probe.rounding());
         self.try_directions()?;
         self.raise()?;
@@ -98,7 +129,8 @@ impl Search<'_, '_> {
         // The contacts of a small overlap surround it; the axis of their ring crosses it.
         let axes = if self.contacts.count > 0 { self.contacts.axes() } else { [Vector::zeros(); 3] };
         let found = axes.into_iter().chain(self.contacts.normals.iter().flatten().copied());
-        for (way, found) in ways.iter_mut().zip(found.chain(self.probe.axes())) {
+        let ([a, b], boxes) = (self.probe.centres(), self.probe.axes());
+        for (way, found) in ways.iter_mut().zip(found.chain([b - a]).chain(boxes.into_iter().flatten())) {
             *way = found;
         }
         for way in ways.into_iter().filter_map(|way| way.try_normalize(1e-9)) {
@@ -182,26 +214,55 @@ impl Search<'_, '_> {
         ControlFlow::Continue(())
     }
 
-    /// Raises the lower bound.
+    /// Raises the lower bound, from the deepest of some places.
     fn raise(&mut self) -> ControlFlow<()> {
-        let (enough, step) = (self.best.length * (1.0 - 2.0 * FINE), 0.125 * self.best.length);
-        // Where the surfaces last touch on the way out, and part of the way back.
+        let enough = (self.best.length * (1.0 - 2.0 * FINE)).min(self.best.length - self.probe.slack());
+        if self.lower >= enough {
+            return ControlFlow::Continue(());
+        }
+        let mut deepest: [Option<Deep>; CLIMBS] = [None; CLIMBS];
+        let (starts, count) = self.starts()?;
+        for &start in &starts[..count] {
+            let Some(mut found) = self.probe.deep(start)? else { continue };
+            for kept in &mut deepest {
+                match kept {
+                    Some(kept) if kept.depth >= found.depth => {}
+                    Some(kept) => std::mem::swap(kept, &mut found),
+                    None => {
+                        *kept = Some(found);
+                        break;
+                    }
+                }
+            }
+        }
+        let step = 0.125 * self.best.length;
+        for start in deepest.into_iter().flatten() {
+            climb(self.probe, start, step, enough, &mut self.lower)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Places that may be inside both things: where they last touch on the way out, and part of the way back,
+    /// and the centre of the contacts.
+    fn starts(&mut self) -> ControlFlow<(), ([Vector; STARTS], usize)> {
+        let (mut starts, mut count) = ([Vector::zeros(); STARTS], 0);
+        let mut add = |start: Vector| {
+            starts[count] = start;
+            count += 1;
+        };
         if let Some((place, _)) = self.probe.touch(self.best.way * self.best.meets)? {
             // The contact may be at a corner; places towards the centres are within.
             let centres = self.probe.centres();
             for share in WAYS_BACK {
                 let start = place - self.best.way * (share * self.best.meets);
                 for to in [start, centres[0], centres[1]] {
-                    if self.lower < enough {
-                        deepen(self.probe, start + (to - start) * 0.1, step, enough, &mut self.lower)?;
-                    }
+                    add(start + (to - start) * 0.1);
                 }
             }
         }
         if self.contacts.count > 0 {
-            let start = self.contacts.centre();
-            deepen(self.probe, start, step, enough, &mut self.lower)?;
+            add(self.contacts.centre());
         }
-        ControlFlow::Continue(())
+        ControlFlow::Continue((starts, count))
     }
 }

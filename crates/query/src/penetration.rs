@@ -1,0 +1,15 @@
+//! How far, and in which direction, to shift one thing out of another.
+//!
+//! The search is the same for two meshes, two scans, and a shape and a scan. Each is a [`Probe`] that
+//! answers the search's questions.
+//!
+//! [`Probe`]: probe::Probe
+
+pub(crate) mod answer;
+mod deepest;
+pub(crate) mod interior;
+pub(crate) mod probe;
+pub(crate) mod scans;
+pub(crate) mod search;
+pub(crate) mod shapes;
+pub(crate) mod survey;

@@ -1,0 +1,88 @@
+//! What is inside a scan that encloses a solid.
+
+use fearless_simd::Level;
+
+use crate::ask::options::Semantics;
+use crate::pair::placed::ViewScratch;
+use crate::penetration::answer::Interior;
+use crate::penetration::probe::Vector;
+use crate::solid::cast::{Crossing, all_hits};
+use crate::solid::core::Solid;
+use crate::solid::distance::distance;
+use crate::solid::elements::Elements;
+use crate::solid::ray::StoredRay;
+
+/// Directions of the rays, of about unit length. They are irrational and far from those of edges and walls.
+const RAYS: [[f64; 3]; 7] = [
+    [0.5257311, 0.7390851, 0.4214187],
+    [-0.6180340, 0.2935127, 0.7291836],
+    [0.1987654, -0.8346268, 0.5137423],
+    [-0.4812118, -0.3789012, -0.7905694],
+    [0.8413442, -0.2614972, -0.4730127],
+    [-0.7320508, 0.6435011, -0.2236068],
+    [0.3090170, 0.4472136, -0.8393972],
+];
+
+/// Rays that decide if they agree.
+const FEW: usize = 3;
+
+/// Working memory.
+pub(crate) type Working<'w> = (Level, &'w mut Vec<Crossing>, &'w mut ViewScratch);
+
+/// Returns `true` if a place of the stored frame is inside the surface of a scan.
+///
+/// A ray from a place inside a closed surface crosses it an odd number of times. Three rays decide if they
+/// agree, otherwise the majority of seven: a ray may leave by a hole, or graze the surface.
+pub(crate) fn is_inside(elements: &Elements<'_>, place: &Vector, working: Working<'_>) -> bool {
+    let bounds = elements.placed.scan().root_box();
+    let away = place - Vector::from(bounds.centre.map(f64::from));
+    let is_beyond = |k: usize| {
+        let axis = Vector::from(bounds.axes[k].map(f64::from));
+        axis.dot(&away).abs() > f64::from(bounds.half[k] + bounds.reach)
+    };
+    // Also true of NaN.
+    if (0..3).any(is_beyond) || !place.iter().all(|x| x.is_finite()) {
+        return false;
+    }
+    let (level, found, scratch) = working;
+    let mut odd = 0;
+    for (n, direction) in RAYS.iter().enumerate() {
+        let direction = Vector::from(*direction).normalize();
+        let ray = StoredRay { origin: *place, direction, max: f64::INFINITY, radius: 0.0 };
+        let mut crossings = 0_u32;
+        all_hits(elements, &ray, (level, &mut *found, &mut *scratch), |_| crossings += 1);
+        odd += usize::from(crossings % 2 == 1);
+        if n + 1 == FEW && (odd == 0 || odd == FEW) {
+            break;
+        }
+    }
+    odd == FEW || 2 * odd > RAYS.len()
+}
+
+/// Returns `true` if the inside counts.
+pub(crate) fn counts(elements: &Elements<'_>, interior: Interior) -> bool {
+    interior == Interior::Solid && !matches!(elements.semantics, Semantics::Thickened(_))
+}
+
+/// The distance of a place inside a solid scan from its surface, in the stored frame, and the direction away
+/// from there. `None` if the place is outside.
+pub(crate) fn depth_in(
+    elements: &Elements<'_>,
+    place: &Vector,
+    (level, found, scratch): Working<'_>,
+) -> Option<(f64, Vector)> {
+    if !is_inside(elements, place, (level, found, scratch)) {
+        return None;
+    }
+    let found = distance(elements, Some(&Solid::point(*place)), f64::INFINITY, level)?;
+    let frame = elements.placed.stored_to_world();
+    let foot = Vector::from(frame.apply_inverse(found.points[0]));
+    let uphill = (place - foot).try_normalize(0.0).unwrap_or_else(Vector::zeros);
+    Some((found.lower / elements.scale(), uphill))
+}
+
+/// The measured point nearest to a place, in the stored frame. `None` if points do not count.
+pub(crate) fn nearest_point(elements: &Elements<'_>, place: &Vector) -> Option<Vector> {
+    let counts = elements.semantics != Semantics::Surface;
+    counts.then(|| elements.position(elements.placed.scan().nearest_point((*place).into()) as usize))
+}

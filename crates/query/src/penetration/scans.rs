@@ -1,0 +1,268 @@
+//! The penetration of two scans.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::NodeId;
+
+use crate::ask::answer::{Answer, Contacts, Evidence, Reason, Statistics, Verdict};
+use crate::ask::budget::{Budget, now};
+use crate::ask::options::{CollidePlan, Semantics};
+use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
+use crate::pair::placed::Placed;
+use crate::pair::placed_balls::is_proper;
+use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::interior::{counts, depth_in, is_inside, nearest_point};
+use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
+use crate::penetration::search::search;
+use crate::penetration::survey::ContactSurvey;
+use crate::solid::cast::Crossing;
+use crate::solid::elements::Elements;
+use crate::solid::plan::ShapePlan;
+
+/// Points of a scan that are looked for inside the other one if their surfaces are apart.
+const PARTS: u32 = 16;
+
+/// Doublings of the shift that moves two balls apart.
+const DOUBLINGS: u32 = 64;
+
+/// Reusable memory.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PenetrationScratch {
+    pub(crate) survey: ContactSurvey,
+    contacts: Contacts,
+}
+
+/// Two placed scans, and the cost of all tests so far. Shifts are those of b, in the world.
+struct ScanProbe<'s> {
+    scans: [Placed<'s>; 2],
+    elements: [Elements<'s>; 2],
+    /// `true` for scans whose inside counts.
+    solid: [bool; 2],
+    plan: CollidePlan,
+    budget: Budget,
+    contact: &'s mut ContactScratch,
+    crossings: &'s mut Vec<Crossing>,
+    contacts: &'s mut Contacts,
+    spent: Statistics,
+}
+
+/// Bounds the penetration of two scans.
+pub(crate) fn penetration<'s>(
+    scans: [&Placed<'s>; 2],
+    (plan, interiors): (&CollidePlan, [Interior; 2]),
+    budget: &Budget,
+    (contact, crossings): (&'s mut ContactScratch, &'s mut Vec<Crossing>),
+    scratch: &'s mut PenetrationScratch,
+) -> Penetration {
+    let scans = scans.map(|scan| *scan);
+    if !scans.iter().all(|scan| is_proper(scan.stored_to_world())) {
+        return Penetration::UNKNOWN;
+    }
+    let of_shapes = ShapePlan::of_pair(plan);
+    let elements = scans.map(|scan| Elements::new(scan, &of_shapes));
+    let solid = [0, 1].map(|k: usize| counts(&elements[k], interiors[k]));
+    let PenetrationScratch { survey, contacts } = scratch;
+    let mut probe = ScanProbe {
+        scans,
+        elements,
+        solid,
+        plan: plan.of_verdicts(),
+        budget: Budget { resolution: None, ..*budget },
+        contact,
+        crossings,
+        contacts,
+        spent: Statistics::default(),
+    };
+    let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
+    let bounds = search(&mut probe, out, survey);
+    let answer = probe.collide_with(bounds.shift, plan, Outputs::default(), &Budget::UNLIMITED);
+    let evidence = match answer.verdict {
+        Verdict::Separated { evidence, .. } => evidence,
+        _ => Evidence::Estimated,
+    };
+    Penetration::new(&bounds, (1.0, |way| way.into()), (evidence, answer.band), probe.spent)
+}
+
+impl ScanProbe<'_> {
+    /// Asks whether the scans meet after a shift.
+    fn collide_with(
+        &mut self,
+        t: Vector,
+        plan: &CollidePlan,
+        outputs: Outputs<'_>,
+        budget: &Budget,
+    ) -> Answer {
+        let [a, b] = &self.scans;
+        let b = b.shifted(t.into());
+        let asked = Asked { scans: [a, &b], plan, budget };
+        let answer = collide(asked, self.contact, outputs);
+        let Statistics { evaluations, node_pairs, leaf_pairs, .. } = answer.statistics;
+        self.spent.evaluations += evaluations;
+        self.spent.node_pairs += node_pairs;
+        self.spent.leaf_pairs += leaf_pairs;
+        answer
+    }
+
+    /// Asks whether the scans meet after a shift. Breaks if the budget is spent.
+    fn collide(&mut self, t: Vector, outputs: Outputs<'_>) -> ControlFlow<(), Answer> {
+        let spent = self.spent.evaluations + self.spent.node_pairs;
+        let budget = Budget { work: self.budget.work.map(|work| work.saturating_sub(spent)), ..self.budget };
+        let plan = self.plan;
+        let answer = self.collide_with(t, &plan, outputs, &budget);
+        match answer.verdict {
+            Verdict::Undecided(Reason::Budget { .. }) => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(answer),
+        }
+    }
+
+    /// A ball about all that counts of scan `k`, in the world.
+    fn ball(&self, k: usize) -> (Vector, f64) {
+        let (scan, placed) = (self.scans[k].scan(), self.scans[k].stored_to_world());
+        let root = scan.tree().enclosure(self.elements[k].part(), NodeId::ROOT);
+        let radius = f64::from(root.radius()) + self.elements[k].beyond_boxes();
+        (placed.apply(root.centre.map(f64::from)).into(), radius * placed.scale())
+    }
+
+    /// A shift along the line of the centres after which the scans are apart; `None` if there is none.
+    fn out_of_balls(&mut self) -> Option<Vector> {
+        let ((a, r), (b, s)) = (self.ball(0), self.ball(1));
+        let between = b - a;
+        let way = between.try_normalize(1e-9 * (r + s)).unwrap_or_else(Vector::z);
+        let radii = r + s + self.plan.options().margin;
+        let mut length = (radii - way.dot(&between)).max(0.0) * (1.0 + 1e-5) + 1e-9 * radii;
+        let plan = self.plan;
+        // Rounding grows with the distance from the origin.
+        for _ in 0..DOUBLINGS {
+            let apart = self.collide_with(way * length, &plan, Outputs::default(), &Budget::UNLIMITED);
+            if apart.verdict.is_separated() {
+                return Some(way * length);
+            }
+            length *= 2.0;
+        }
+        None
+    }
+
+    /// Returns `true` if a part of the other scan is inside the solid of scan `k` after a shift.
+    ///
+    /// If the surfaces do not meet, each part of a scan is inside or outside as a whole.
+    fn has_part_inside(&mut self, k: usize, t: Vector) -> bool {
+        let other = &self.scans[1 - k];
+        let shift = if k == 0 { t } else { -t };
+        let count = other.scan().len();
+        (0..PARTS).any(|n| {
+            let i = count * n as usize / PARTS as usize;
+            let place = Vector::from(other.point(i)) + shift;
+            let stored = self.scans[k].stored_to_world().apply_inverse(place.into());
+            self.spent.evaluations += 1;
+            let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
+            is_inside(&self.elements[k], &stored.into(), working)
+        })
+    }
+
+    /// Breaks if the budget is spent.
+    fn go_on(&self) -> ControlFlow<()> {
+        let spent = self.spent.evaluations + self.spent.node_pairs;
+        let is_over = self.budget.work.is_some_and(|work| spent >= work)
+            || self.budget.deadline.is_some_and(|deadline| now() >= deadline.0);
+        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    /// The greatest shift under which two balls of thickened points stay in contact, from the residual of
+    /// their contact; 0 for surfaces.
+    fn depth_of(&self, residual: f64) -> f64 {
+        match self.plan.options().semantics {
+            Semantics::Thickened(_) => self.plan.reach() - 2.0 * residual,
+            _ => 0.0,
+        }
+    }
+}
+
+impl Probe for ScanProbe<'_> {
+    fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
+        let answer = self.collide(t, Outputs::default())?;
+        let is_nested = |probe: &mut Self, k: usize| probe.solid[k] && probe.has_part_inside(k, t);
+        ControlFlow::Continue(answer.verdict.is_separated() && !is_nested(self, 0) && !is_nested(self, 1))
+    }
+
+    /// The direction is that of the normal that is nearest to the shift.
+    fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
+        let Verdict::Intersecting { contact, .. } = self.collide(t, Outputs::default())?.verdict else {
+            return ControlFlow::Continue(None);
+        };
+        let normals = contact.normals.unwrap_or([[0.0; 3]; 2]).map(Vector::from);
+        let [a, b] = normals.map(|normal| normal * 1.0_f64.copysign(normal.dot(&t)));
+        let way = if a.dot(&t) >= b.dot(&t) { a } else { b };
+        ControlFlow::Continue(Some((contact.point.into(), way)))
+    }
+
+    fn survey(&mut self, survey: &mut ContactSurvey) -> ControlFlow<()> {
+        survey.clear();
+        let mut contacts = std::mem::take(self.contacts);
+        let outputs = Outputs { contacts: Some(&mut contacts), ..Outputs::default() };
+        let flow = self.collide(Vector::zeros(), outputs);
+        for contact in &contacts.contacts {
+            let normals = contact.normals.unwrap_or([[0.0; 3]; 2]).map(Vector::from);
+            survey.add(contact.point.into(), normals, self.depth_of(contact.residual));
+        }
+        let complete = contacts.complete;
+        *self.contacts = contacts;
+        flow?;
+        if complete { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    }
+
+    /// Of a scan without inside, the measured point nearest to the place counts.
+    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+        if self.solid == [false; 2] {
+            return ControlFlow::Continue(None);
+        }
+        self.go_on()?;
+        self.spent.evaluations += 1;
+        let mut found = Deep { place, depth: self.plan.options().margin, uphill: Vector::zeros() };
+        for k in 0..2 {
+            if !self.solid[k] {
+                let placed = self.scans[k].stored_to_world();
+                let stored = placed.apply_inverse(place.into()).into();
+                let Some(point) = nearest_point(&self.elements[k], &stored) else {
+                    return ControlFlow::Continue(None);
+                };
+                found.place = placed.apply(point.into()).into();
+            }
+        }
+        for k in 0..2 {
+            if self.solid[k] {
+                let placed = self.scans[k].stored_to_world();
+                let stored = Vector::from(placed.apply_inverse(found.place.into()));
+                let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
+                let Some((depth, uphill)) = depth_in(&self.elements[k], &stored, working) else {
+                    return ControlFlow::Continue(None);
+                };
+                found.depth += depth * placed.scale();
+                found.uphill += Vector::from(placed.rotate(uphill.into()));
+            }
+        }
+        ControlFlow::Continue(Some(found))
+    }
+
+    fn centres(&self) -> [Vector; 2] {
+        [self.ball(0).0, self.ball(1).0]
+    }
+
+    fn axes(&self) -> [[Vector; 3]; 2] {
+        self.scans.map(|scan| {
+            let placed = *scan.stored_to_world();
+            scan.scan().root_box().axes.map(|axis| Vector::from(placed.rotate(axis.map(f64::from))))
+        })
+    }
+
+    fn slack(&self) -> f64 {
+        SLACK * self.scans.iter().map(Placed::sampling_radius).fold(0.0, f64::max)
+    }
+
+    fn rounding(&self) -> f64 {
+        let far = |k: usize| {
+            let (centre, radius) = self.ball(k);
+            centre.amax() + radius
+        };
+        1e-12 * (far(0) + far(1))
+    }
+}

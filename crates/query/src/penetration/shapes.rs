@@ -1,0 +1,166 @@
+//! The penetration of a convex shape and a scan, in the stored frame of the scan.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::Level;
+
+use crate::ask::answer::{Evidence, Statistics};
+use crate::ask::budget::{Budget, now};
+use crate::pair::placed::ViewScratch;
+use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::interior::{counts, depth_in, is_inside, nearest_point};
+use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
+use crate::penetration::search::search;
+use crate::penetration::survey::ContactSurvey;
+use crate::solid::answer::{ShapeAnswer, ShapeVerdict};
+use crate::solid::contacts::contacts;
+use crate::solid::core::Solid;
+use crate::solid::elements::Elements;
+use crate::solid::scratch::SolidScratch;
+use crate::solid::touch::touch;
+
+/// Doublings of the shift that moves the shape away.
+const DOUBLINGS: u32 = 64;
+
+/// A scan as a, and a shape as b.
+struct ShapeProbe<'s, 'a> {
+    elements: &'s Elements<'a>,
+    solid: &'s Solid<'s>,
+    /// `true` if the inside of the scan counts.
+    is_solid: bool,
+    budget: Budget,
+    level: Level,
+    scratch: &'s mut ViewScratch,
+    memory: &'s mut SolidScratch,
+    spent: Statistics,
+}
+
+/// Bounds the penetration of a shape and a scan. `elements` has the detail `Verdict`.
+pub(crate) fn penetration(
+    elements: &Elements<'_>,
+    solid: Option<&Solid<'_>>,
+    (interior, budget): (Interior, &Budget),
+    (level, scratch, memory): (Level, &mut ViewScratch, &mut SolidScratch),
+    survey: &mut ContactSurvey,
+) -> Penetration {
+    let Some(solid) = solid else { return Penetration::UNKNOWN };
+    let is_solid = counts(elements, interior);
+    let (budget, spent) = (*budget, Statistics::default());
+    let mut probe = ShapeProbe { elements, solid, is_solid, budget, level, scratch, memory, spent };
+    let Some(out) = probe.out_of_ball() else { return Penetration::UNKNOWN };
+    let bounds = search(&mut probe, out, survey);
+    let answer = probe.touch_at(bounds.shift);
+    let evidence = match answer.verdict {
+        ShapeVerdict::Separated { evidence } => evidence,
+        _ => Evidence::Estimated,
+    };
+    let turned = |way: Vector| elements.turned(&way);
+    Penetration::new(&bounds, (elements.scale(), turned), (evidence, answer.band), probe.spent)
+}
+
+impl ShapeProbe<'_, '_> {
+    /// Asks whether the shape touches the scan after a shift.
+    fn touch_at(&mut self, t: Vector) -> ShapeAnswer {
+        self.spent.evaluations += 1;
+        touch(self.elements, Some(&self.solid.shifted(&t)), (self.level, &mut *self.scratch))
+    }
+
+    /// A shift away from the centre of the scan after which the shape touches nothing; `None` if there is none.
+    fn out_of_ball(&mut self) -> Option<Vector> {
+        let bounds = self.elements.arrays.tree.root_box();
+        let centre = Vector::from(bounds.centre.map(f64::from));
+        let size = f64::from(bounds.radius() + bounds.reach) + self.elements.beyond_boxes();
+        let own = self.solid.half.norm() + self.solid.radius;
+        let between = self.solid.centre - centre;
+        let way = between.try_normalize(1e-9 * (size + own)).unwrap_or_else(Vector::z);
+        let radii = size + own + self.elements.margin;
+        let mut length = (radii - way.dot(&between)).max(0.0) * (1.0 + 1e-5) + 1e-9 * radii;
+        for _ in 0..DOUBLINGS {
+            if self.touch_at(way * length).verdict.is_separated() {
+                return Some(way * length);
+            }
+            length *= 2.0;
+        }
+        None
+    }
+
+    /// Breaks if the budget is spent. A test of the shape counts as an evaluation.
+    fn go_on(&self) -> ControlFlow<()> {
+        let is_over = self.budget.work.is_some_and(|work| self.spent.evaluations >= work)
+            || self.budget.deadline.is_some_and(|deadline| now() >= deadline.0);
+        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+impl Probe for ShapeProbe<'_, '_> {
+    /// If the shape touches nothing, it is inside or outside as a whole.
+    fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
+        self.go_on()?;
+        let is_separated = self.touch_at(t).verdict.is_separated();
+        let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
+        let is_nested =
+            is_separated && self.is_solid && is_inside(self.elements, &(self.solid.inside + t), working);
+        ControlFlow::Continue(is_separated && !is_nested)
+    }
+
+    /// The direction is that of the normal of the deepest contact.
+    fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
+        self.go_on()?;
+        self.spent.evaluations += 1;
+        let SolidScratch { candidates, contacts: found, .. } = &mut *self.memory;
+        let working = (self.level, &mut *self.scratch, candidates);
+        contacts(self.elements, Some(&self.solid.shifted(&t)), None, found, working);
+        let frame = self.elements.placed.stored_to_world();
+        ControlFlow::Continue(found.first().map(|contact| {
+            let normal = Vector::from(frame.rotate_inverse(contact.normal));
+            (frame.apply_inverse(contact.point).into(), normal * 1.0_f64.copysign(normal.dot(&t)))
+        }))
+    }
+
+    fn survey(&mut self, survey: &mut ContactSurvey) -> ControlFlow<()> {
+        survey.clear();
+        let _deepest = self.touch(Vector::zeros())?;
+        let frame = self.elements.placed.stored_to_world();
+        for contact in &self.memory.contacts {
+            let normal = Vector::from(frame.rotate_inverse(contact.normal));
+            survey.add(frame.apply_inverse(contact.point).into(), [normal, Vector::zeros()], 0.0);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Of a scan without inside, the measured point nearest to the place counts.
+    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+        self.go_on()?;
+        self.spent.evaluations += 1;
+        let place = if self.is_solid { Some(place) } else { nearest_point(self.elements, &place) };
+        let Some(place) = place else { return ControlFlow::Continue(None) };
+        let Some((own, uphill)) = self.solid.depth(&place) else { return ControlFlow::Continue(None) };
+        let mut found = Deep { place, depth: self.elements.margin + own, uphill };
+        if self.is_solid {
+            let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
+            let Some((depth, uphill)) = depth_in(self.elements, &place, working) else {
+                return ControlFlow::Continue(None);
+            };
+            found.depth += depth;
+            found.uphill += uphill;
+        }
+        ControlFlow::Continue(Some(found))
+    }
+
+    fn centres(&self) -> [Vector; 2] {
+        [self.elements.arrays.tree.root_box().centre.map(f64::from).into(), self.solid.inside]
+    }
+
+    fn axes(&self) -> [[Vector; 3]; 2] {
+        let of_scan = self.elements.arrays.tree.root_box().axes;
+        [of_scan.map(|axis| axis.map(f64::from).into()), self.solid.axes]
+    }
+
+    fn slack(&self) -> f64 {
+        SLACK * f64::from(self.elements.arrays.sampling_radius)
+    }
+
+    fn rounding(&self) -> f64 {
+        1e-12 * (self.elements.far + self.solid.centre.amax() + self.solid.half.amax() + self.solid.radius)
+    }
+}

@@ -1,0 +1,71 @@
+//! Contacts in brief: how many there are, where, and between which normals.
+
+use crate::penetration::probe::Vector;
+
+/// The contacts of two things in brief.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ContactSurvey {
+    pub(crate) count: u32,
+    /// Sums of the coordinates, and of their products xx xy xz yy yz zz, about the first point.
+    first: Vector,
+    sum: Vector,
+    products: [f64; 6],
+    /// Unit normals of both surfaces at some contacts, evenly spread over all.
+    pub(crate) normals: Vec<[Vector; 2]>,
+    /// One of this many contacts is kept.
+    stride: u32,
+    /// The greatest shift under which a contact surely stays.
+    pub(crate) least: f64,
+}
+
+/// The number of contacts whose normals are kept at most.
+pub(crate) const KEPT: usize = 8;
+
+impl ContactSurvey {
+    /// Forgets all contacts, and keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        let mut normals = std::mem::take(&mut self.normals);
+        normals.clear();
+        *self = Self { normals, stride: 1, ..Self::default() };
+    }
+
+    pub(crate) fn add(&mut self, point: Vector, normals: [Vector; 2], depth: f64) {
+        if self.count == 0 {
+            self.first = point;
+        }
+        let d = point - self.first;
+        self.sum += d;
+        let products = [d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z];
+        self.products = [0, 1, 2, 3, 4, 5].map(|k| self.products[k] + products[k]);
+        if self.count.is_multiple_of(self.stride) {
+            if self.normals.len() == KEPT {
+                // Every other one.
+                let mut i = 0;
+                self.normals.retain(|_| {
+                    i += 1;
+                    i % 2 == 1
+                });
+                self.stride *= 2;
+            }
+            if self.count.is_multiple_of(self.stride) {
+                self.normals.push(normals);
+            }
+        }
+        self.count += 1;
+        self.least = self.least.max(depth);
+    }
+
+    /// Returns the mean of the points.
+    pub(crate) fn centre(&self) -> Vector {
+        self.first + self.sum / f64::from(self.count.max(1))
+    }
+
+    /// Returns the principal axes of the points, the one of least extent first.
+    pub(crate) fn axes(&self) -> [Vector; 3] {
+        let n = f64::from(self.count.max(1));
+        let m = self.sum / n;
+        let of_mean = [m.x * m.x, m.x * m.y, m.x * m.z, m.y * m.y, m.y * m.z, m.z * m.z];
+        let covariance = [0, 1, 2, 3, 4, 5].map(|k| self.products[k] / n - of_mean[k]);
+        nearmiss_surface::symmetric_eigen(covariance).vectors.map(Vector::from)
+    }
+}
