@@ -6,10 +6,10 @@
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
     Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves,
-    Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interpolation, ManifoldPoint,
-    Mesh, MeshBuildOptions, MeshPair, MeshScanPair, MeshScanPlan, MeshSolid, Method, Motion, Pair, Paths,
-    Pose, Prepared, Ray, Scan, Scratch, Semantics, Shape, ShapeHint, ShapePlan, Sweep, SweepOptions,
-    SweepPlan, SweepVerdict, Target, Verdict,
+    Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interior, Interpolation,
+    ManifoldPoint, Mesh, MeshBuildOptions, MeshPair, MeshScanPair, MeshScanPlan, MeshSolid, Method, Motion,
+    Pair, Paths, Pose, Prepared, Ray, Scan, Scratch, Semantics, Shape, ShapeHint, ShapePlan, Sweep,
+    SweepOptions, SweepPlan, SweepVerdict, Target, Verdict,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -239,6 +239,25 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     let before = ALLOCATOR.calls();
     assert_eq!(separate_all().to_bits(), first.to_bits(), "penetrations depend on the scratch");
     assert_eq!(ALLOCATOR.calls() - before, 0, "penetrations allocated");
+    assert!(first > object.r, "some overlap: {first}");
+
+    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
+    let target = Target::new(scan.at(&Pose::IDENTITY), &shapes[0]);
+    let mut part_all = || {
+        let mut sum = 0.0;
+        for (pose, work) in poses.iter().step_by(20).zip([u64::MAX, 4000].into_iter().cycle()) {
+            let budget = Budget::UNLIMITED.with_work(work);
+            let pair = Pair::new(scan.at(&Pose::IDENTITY), scan.at(pose)).within(&budget);
+            sum += pair.penetration(&plan, [Interior::Solid; 2], &mut scratch).upper;
+            let cuboid = Shape::Box { pose: *pose, half: [6.0 * object.r; 3], radius: 0.0 };
+            sum += target.penetration(&cuboid, Interior::Solid, &budget, &mut scratch).upper;
+        }
+        sum
+    };
+    let first = part_all();
+    let before = ALLOCATOR.calls();
+    assert_eq!(part_all().to_bits(), first.to_bits(), "penetrations of scans depend on the scratch");
+    assert_eq!(ALLOCATOR.calls() - before, 0, "penetrations of scans allocated");
     assert!(first > object.r, "some overlap: {first}");
 
     let rng = &mut rng(5);

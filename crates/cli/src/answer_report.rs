@@ -1,10 +1,13 @@
 //! Answers to collision queries, as JSON and as text.
 
-use nearmiss::{Answer, Contact, Contacts, Evidence, ManifoldPoint, Reason, Statistics, Verdict};
+use nearmiss::{
+    Answer, Contact, Contacts, Evidence, ManifoldPoint, Penetration, Reason, Statistics, Verdict,
+};
 use serde::Serialize;
 
 use crate::contacts::{GroupReport, Grouped, SHOWN};
 use crate::digits::{count, place, rough, short, work};
+use crate::penetration::PenetrationReport;
 
 /// The JSON output of `collide`.
 #[derive(Debug, Serialize)]
@@ -47,6 +50,9 @@ pub(crate) struct AnswerReport {
     /// The manifold, the deepest point first.
     #[serde(skip_serializing_if = "Option::is_none")]
     manifold: Option<Vec<PlaceReport>>,
+    /// Absent if it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    penetration: Option<Option<PenetrationReport>>,
     /// The items that the sources count: points or triangles.
     #[serde(skip)]
     items: [&'static str; 2],
@@ -124,6 +130,7 @@ impl AnswerReport {
             link: None,
             clashes: None,
             manifold: None,
+            penetration: None,
             items: ["point"; 2],
         }
     }
@@ -184,6 +191,11 @@ impl AnswerReport {
     pub(crate) fn with_manifold(self, places: Option<&[ManifoldPoint]>) -> Self {
         let manifold = places.map(|places| places.iter().map(PlaceReport::new).collect());
         Self { manifold, ..self }
+    }
+
+    /// Adds the penetration, if it was asked for.
+    pub(crate) fn with_penetration(self, found: Option<&Penetration>) -> Self {
+        Self { penetration: found.map(PenetrationReport::new), ..self }
     }
 
     /// Returns the report with the clashes into which the contacts are grouped.

@@ -2,8 +2,8 @@
 
 use nearmiss::{
     Answer, Budget, CollideOptions, CollidePlan, Contact, Contacts, Distance, DistanceOptions, DistancePlan,
-    ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, Pair, Placed, PlacedMesh, PlanError, Pose, Proof, Scan,
-    Scratch, Semantics,
+    Interior, ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, Pair, Penetration, Placed, PlacedMesh,
+    PlanError, Pose, Proof, Scan, Scratch, Semantics,
 };
 
 use crate::contacts::{ContactArgs, Grouped};
@@ -173,6 +173,22 @@ impl<'a> Views<'a> {
             }
             // Plans come from the same bodies.
             _ => Answer::UNASKED,
+        }
+    }
+
+    /// Bounds the penetration of two scans with these insides; `None` for a mesh and a scan.
+    pub(crate) fn penetration(
+        &self,
+        plan: &Plan,
+        interiors: [Interior; 2],
+        budget: &Budget,
+        scratch: &mut Scratch,
+    ) -> Option<Penetration> {
+        match (self, plan) {
+            (Self::Scans([a, b]), Plan::Scans(plan)) => {
+                Some(Pair::new(*a, *b).within(budget).penetration(plan, interiors, scratch))
+            }
+            _ => None,
         }
     }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use nearmiss::{
     Answer, Budget, CollideOptions, Contacts, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
-    Evidence, Metric, Pose, Proof, Scan, Scratch, Verdict,
+    Evidence, Interior, Metric, Penetration, Pose, Proof, Scan, Scratch, Verdict,
 };
 
 use crate::answer_report::AnswerReport;
@@ -20,6 +20,7 @@ use crate::eval::KernelName;
 use crate::mesh::args::MeshCollideArgs;
 use crate::path::PathLog;
 use crate::path_entry::{PathEntry, PathVerdict};
+use crate::penetration::{interiors, penetration_sentence};
 use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PoseFile, Posed};
 use crate::units::SizeCheck;
@@ -35,6 +36,8 @@ struct Question {
     prove: bool,
     all: bool,
     manifold: bool,
+    /// The insides of the scans, if the penetration is wanted.
+    interiors: Option<[Interior; 2]>,
     /// The plan of distance queries for the clearance along a path, if it is needed.
     clearance: Option<DistancePlan>,
     sizes: SizeCheck,
@@ -56,7 +59,10 @@ impl Question {
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
         let clearance = self.clearance.as_ref().filter(|_| needs_clearance(&answer, self.plan.options()));
         let clearance = clearance.map(|plan| views.distance(plan, &self.budget_from(now()), scratch));
-        Asked { line, time, poses, answer, clearance, wanted, micros }
+        let penetration = self.interiors.and_then(|interiors| {
+            views.penetration(&self.plan, interiors, &self.budget_from(now()), scratch)
+        });
+        Asked { line, time, poses, answer, clearance, penetration, wanted, micros }
     }
 
     /// Returns the budget of a query that starts at `start`.
@@ -95,7 +101,7 @@ impl Question {
             let csv = args.path.csv.as_deref().filter(|_| asked.line.is_none());
             args.contacts.write(csv, all, grouped)?;
         }
-        let report = report.with_clashes(grouped.as_ref());
+        let report = report.with_clashes(grouped.as_ref()).with_penetration(asked.penetration.as_ref());
         if args.json {
             return results.json(&report);
         }
@@ -105,14 +111,21 @@ impl Question {
         let distance = distance.as_ref().or(asked.clearance.as_ref());
         let sentence = views.sentence(&asked.answer, options, distance);
         if let Some(line) = asked.line {
-            return results.line(format_args!("line {line}: {sentence}"));
+            let apart = asked.penetration.as_ref();
+            let apart = apart.and_then(|found| penetration_sentence(found, "b", views.unit()));
+            let apart = apart.map_or_else(String::new, |apart| format!(" {apart}"));
+            return results.line(format_args!("line {line}: {sentence}{apart}"));
         }
         results.line(sentence)?;
         if let Some(hint) = views.hint(&asked.answer) {
             results.line(hint)?;
         }
-        results.line(report.details())?;
         let unit = views.unit();
+        let apart = asked.penetration.as_ref().and_then(|found| penetration_sentence(found, "b", unit));
+        if let Some(apart) = apart {
+            results.line(apart)?;
+        }
+        results.line(report.details())?;
         if let Some((all, grouped)) = &grouped {
             grouped.lines(all, unit).iter().try_for_each(|line| results.line(line))?;
         }
@@ -135,6 +148,8 @@ struct Asked {
     answer: Answer,
     /// The distance, if it was computed.
     clearance: Option<Distance>,
+    /// The penetration, if it is wanted.
+    penetration: Option<Penetration>,
     wanted: Wanted,
     micros: f64,
 }
@@ -201,8 +216,20 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let wants_clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
     let distance = DistanceOptions::default().with_semantics(plan.options().semantics);
     let clearance = wants_clearance.then(|| bodies.distance_plan(&distance)).transpose()?;
-    let question =
-        Question { bodies, plan, budget, work, resolution, prove, all: args.all, manifold, clearance, sizes };
+    let interiors = args.penetration.then(|| interiors(args.solid));
+    let question = Question {
+        bodies,
+        plan,
+        budget,
+        work,
+        resolution,
+        prove,
+        all: args.all,
+        manifold,
+        interiors,
+        clearance,
+        sizes,
+    };
 
     let mut results = Results::new();
     output::replace_if_any(args.prove.as_deref(), |proof| {
@@ -250,7 +277,7 @@ fn mesh_args(args: &CollideArgs) -> MeshCollideArgs {
         first: args.first,
         all: args.all,
         contacts: args.contacts.clone(),
-        penetration: false,
+        penetration: args.penetration,
         budget: args.budget,
         work: args.work,
         p_min: None,

@@ -12,6 +12,7 @@ use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
 use crate::parse::{parse_duration, parse_radius, parse_threads, parse_work};
 use crate::path::PathArgs;
+use crate::penetration::SolidName;
 use crate::posing::PairArgs;
 use crate::search::{MethodName, OrderName, SearchArgs};
 use crate::viewpoint::ViewArgs;
@@ -78,6 +79,18 @@ pub struct CollideArgs {
     /// The treatment of the contacts
     #[command(flatten)]
     pub contacts: ContactArgs,
+    /// Also report how far and in which direction to move B out of A
+    ///
+    /// The distance is reported as a lower and an upper bound, which hold even if --budget or --work ends the
+    /// search. Name scans with a closed surface by --solid.
+    #[arg(long)]
+    pub penetration: bool,
+    /// Scans whose closed surface encloses a solid, for --penetration
+    ///
+    /// What is inside a solid overlaps it. Other scans are surfaces without inside, such as rooms. Without a
+    /// solid scan there is no lower bound, except with --thickened.
+    #[arg(long, value_enum, value_name = "WHICH", requires = "penetration", conflicts_with = "thickened")]
+    pub solid: Option<SolidName>,
     /// The search options
     #[command(flatten)]
     pub search: SearchArgs,
@@ -138,6 +151,8 @@ impl CollideArgs {
                 self.detail == DetailName::Manifold || of_meshes && self.detail == DetailName::Verdict,
             ),
             ("--order", of_papers || of_meshes && order.is_some()),
+            ("--penetration", !of_meshes && self.penetration),
+            ("--solid", self.solid.is_some()),
             ("--prove", self.prove.is_some()),
             ("--method", self.search.method != MethodName::Traversal),
             ("--flat", self.search.flat),

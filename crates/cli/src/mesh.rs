@@ -5,7 +5,6 @@ pub(crate) mod collide;
 pub(crate) mod contacts;
 pub(crate) mod distance;
 pub(crate) mod open;
-pub(crate) mod penetration;
 pub(crate) mod picture;
 pub(crate) mod report;
 pub(crate) mod two_meshes;

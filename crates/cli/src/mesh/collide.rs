@@ -8,7 +8,6 @@ use nearmiss_draw::picture::Picture;
 
 use super::args::MeshCollideArgs;
 use super::contacts::MeshContacts;
-use super::penetration::penetration_sentence;
 use super::picture::{Told, paint};
 use super::report::{MeshAnswerReport, evidence_and_reason, kind};
 use super::two_meshes::{TwoMeshes, micros_since};
@@ -18,6 +17,7 @@ use crate::error::CliError;
 use crate::output;
 use crate::path::PathLog;
 use crate::path_entry::PathEntry;
+use crate::penetration::penetration_sentence;
 use crate::picture::{Style, check_name, names};
 use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PoseFile, Posed};
@@ -205,7 +205,7 @@ impl Question<'_> {
         let beside =
             is_apart.then(|| self.meshes.pair(&asked.poses, now()).distance(&mut MeshScratch::default()));
         let distance = beside.as_ref().or(asked.clearance.as_ref());
-        let apart = asked.penetration.as_ref().and_then(|found| penetration_sentence(found, unit));
+        let apart = asked.penetration.as_ref().and_then(|found| penetration_sentence(found, "b", unit));
         let sentence = sentence(&asked.answer, distance, unit);
         let sentence = match apart {
             Some(apart) => format!("{sentence} {apart}"),

@@ -4,10 +4,10 @@ use nearmiss::{ContactRegion, Mesh, MeshAnswer, MeshDistance, MeshVerdict, Penet
 use serde::Serialize;
 
 use super::contacts::{MeshClashReport, MeshContactReport, MeshContacts};
-use super::penetration::PenetrationReport;
 use crate::answer_report::{AnswerReport, between};
 use crate::digits::{counts, place, work};
 use crate::path_entry::PathVerdict;
+use crate::penetration::PenetrationReport;
 use crate::report::{file_line, hierarchy_line, leaves};
 use crate::units::diagonal;
 

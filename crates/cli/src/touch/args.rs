@@ -40,6 +40,17 @@ pub struct TouchArgs {
     /// Shapes within this distance of the surface touch it; needs --surface or --thickened
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius)]
     pub margin: Option<f64>,
+    /// Also report how far and in which direction to move each shape out of the scan; needs --surface or
+    /// --thickened
+    ///
+    /// The distance is reported as a lower and an upper bound.
+    #[arg(long)]
+    pub penetration: bool,
+    /// The scan's closed surface encloses a solid, so shapes inside overlap it; for --penetration
+    ///
+    /// Without it, the way out may lead to either side of the surface.
+    #[arg(long, requires = "penetration", conflicts_with = "thickened")]
+    pub solid: bool,
     /// Threads to prepare a raw input; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
     pub threads: Option<usize>,

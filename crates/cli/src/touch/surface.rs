@@ -1,7 +1,8 @@
 //! Shapes against the surface of a scan.
 
 use nearmiss::{
-    CollideOptions, Placed, Reason, Scratch, Semantics, Shape, ShapeContact, ShapePlan, ShapeVerdict, Target,
+    Budget, CollideOptions, Interior, Placed, Reason, Scratch, Semantics, Shape, ShapeContact, ShapePlan,
+    ShapeVerdict, Target,
 };
 use serde::Serialize;
 
@@ -9,6 +10,7 @@ use crate::answer_report::word;
 use crate::console::{Results, now};
 use crate::digits::{place, rough, rounded_down, short};
 use crate::error::CliError;
+use crate::penetration::{PenetrationReport, penetration_sentence};
 use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 
@@ -17,6 +19,8 @@ use crate::touch::shapes::ShapeFile;
 pub(super) struct Asked {
     semantics: Semantics,
     margin: f64,
+    /// The inside of the scan, if the penetration is wanted.
+    interior: Option<Interior>,
 }
 
 impl Asked {
@@ -25,6 +29,11 @@ impl Asked {
         let semantics = match args.thickened {
             Some(radius) => Semantics::Thickened(radius),
             None if args.surface => Semantics::Obstacle,
+            None if args.penetration => {
+                let what =
+                    "--penetration: expected --surface or --thickened beside it, got neither; add --surface";
+                return Err(CliError::Usage(what.to_owned()));
+            }
             None if args.margin.is_some() => {
                 let what = "--margin: expected --surface or --thickened beside it, got neither; points alone are \
                             compared without a margin, and `gap` tells how far they are";
@@ -32,7 +41,9 @@ impl Asked {
             }
             None => return Ok(None),
         };
-        Ok(Some(Self { semantics, margin: args.margin.unwrap_or(0.0) }))
+        let of_scan = if args.solid { Interior::Solid } else { Interior::Hollow };
+        let interior = args.penetration.then_some(of_scan);
+        Ok(Some(Self { semantics, margin: args.margin.unwrap_or(0.0), interior }))
     }
 }
 
@@ -47,6 +58,9 @@ struct SurfaceReport<'a> {
     contacts: &'a [ShapeContact],
     /// The local spacing, below which the scan does not tell; null for invalid shapes.
     band: f64,
+    /// Absent if it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    penetration: Option<Option<PenetrationReport>>,
     micros: f64,
 }
 
@@ -64,14 +78,21 @@ pub(super) fn of_surface(
     while let Some((line, text)) = shapes.next_line()? {
         let read = shapes.shape(line, &text, r);
         let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
-        let report = answer(&target, &shape.shape(), &mut contacts, &mut scratch);
-        let Some(report) = report else {
+        let shape = shape.shape();
+        let report = answer(&target, &shape, &mut contacts, &mut scratch);
+        let Some(mut report) = report else {
             return results.flush().and(Err(shapes.too_far(line)));
         };
+        let penetration = asked
+            .interior
+            .map(|interior| target.penetration(&shape, interior, &Budget::UNLIMITED, &mut scratch));
+        report.penetration = penetration.as_ref().map(PenetrationReport::new);
         if is_json {
             results.json(&report)?;
         } else {
-            results.line(format_args!("line {line}: {}", sentence(&report, asked.margin, 0.01 * r)))?;
+            let way = penetration.and_then(|found| penetration_sentence(&found, "it", 0.01 * r));
+            let way = way.map_or_else(String::new, |way| format!(" {way}"));
+            results.line(format_args!("line {line}: {}{way}", sentence(&report, asked.margin, 0.01 * r)))?;
         }
     }
     results.flush()
@@ -104,6 +125,7 @@ fn answer<'c>(
         upper: distance.map(|it| it.upper),
         contacts,
         band: answer.band,
+        penetration: None,
         micros,
     })
 }

@@ -1,7 +1,7 @@
 //! `collide`.
 
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
-use nearmiss_testdata::shapes::sphere;
+use nearmiss_testdata::shapes::{patch, sphere};
 use serde_json::Value;
 
 use crate::running::{Place, keys, name, numbers, shift, sorted};
@@ -456,4 +456,30 @@ fn a_margin_makes_near_misses_contacts() {
     assert!(told.contains("They come within 0.8 of each other at "), "{told}");
     let balls = ask(&place, &["--pose-b", &apart, "--thickened", "0.2", "--margin", "0.3"]);
     assert_eq!(balls["verdict"], "intersecting", "0.2 apart: {balls}");
+}
+
+#[test]
+fn a_penetration_tells_how_to_get_scans_apart() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    place.cloud("floor.xyz", patch(4.0, 4.0), 0.05);
+    let pose = shift(0.1, 0.2, 0.7);
+    let asked = ["collide", "floor.xyz", "ball.xyz", "--pose-b", &pose, "--penetration", "--quiet"];
+    let answer = place.ok(&[&asked[..], &["--solid", "b", "--json"]].concat()).json().remove(0);
+    let found = &answer["penetration"];
+    let [lower, upper] = ["lower", "upper"].map(|key| found[key].as_f64().unwrap());
+    assert!(lower > 0.2 && lower < 0.33 && (upper - 0.3).abs() < 0.05, "{answer}");
+    assert!(numbers(&found["direction"])[2] > 0.98, "{answer}");
+    let words = place.ok(&[&asked[..], &["--solid", "b"]].concat()).results;
+    assert!(words.contains("Moving b by 0.3") && words.contains("no shift below 0.2"), "{words}");
+    let hollow = place.ok(&asked).results;
+    assert!(hollow.contains("a shorter shift may do"), "{hollow}");
+    let short = place.ok(&[&asked[..], &["--work", "100", "--json"]].concat()).json().remove(0);
+    assert!(short["penetration"]["complete"] == false, "{short}");
+    place.write("poses.txt", "0 0 0.7 0 0 0 1\n0 0 3 0 0 0 1\n");
+    let many = [&asked[..3], &["--poses", "poses.txt", "--penetration", "--solid", "b", "--quiet"]].concat();
+    let many = place.ok(&many).results;
+    assert_eq!(many.matches("Moving b by").count(), 1, "{many}");
+    let refused = place.run(&["collide", "floor.xyz", "ball.xyz", "--as-mesh", "a", "--penetration"]);
+    assert!(refused.status == 2 && refused.errors.contains("--penetration"), "{}", refused.errors);
 }

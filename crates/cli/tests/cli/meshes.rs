@@ -341,7 +341,7 @@ fn a_penetration_tells_how_to_get_meshes_apart() {
     };
     let deep = ask(&["--pose-b", &shift(1.5, 0.3, 0.2)]);
     let found = &deep["penetration"];
-    assert_eq!(keys(found), sorted("lower upper direction"));
+    assert_eq!(keys(found), sorted("lower upper direction evidence"));
     let [lower, upper] = ["lower", "upper"].map(|key| found[key].as_f64().unwrap());
     assert!(lower > 0.45 && lower <= 0.5 && (0.5..0.5001).contains(&upper), "{deep}");
     let way = numbers(&found["direction"]);

@@ -147,3 +147,36 @@ fn shapes_on_a_floor_have_contacts_with_the_surface() {
     let of_points = place.ok(&["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--json"]).json();
     assert!(of_points.iter().all(|line| line["gap"].as_f64().is_some_and(|gap| gap < 0.1)), "{of_points:?}");
 }
+
+#[test]
+fn a_penetration_tells_the_way_out_of_a_ball() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    place.write(
+        "shapes.jsonl",
+        r#"{"sphere":{"centre":[0.8,0,0],"radius":0.3}}
+{"sphere":{"centre":[0.3,0,0],"radius":0.3}}
+{"sphere":{"centre":[2,0,0],"radius":0.3}}
+"#,
+    );
+    let asked = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--surface", "--penetration", "--json"];
+    let solid = place.ok(&[&asked[..], &["--solid"]].concat()).json();
+    for (line, exact) in solid.iter().zip([0.5, 1.0]) {
+        let found = &line["penetration"];
+        assert_eq!(keys(found), sorted("lower upper direction evidence"));
+        let [lower, upper] = ["lower", "upper"].map(|key| found[key].as_f64().unwrap());
+        assert!(lower <= exact + 0.05 && lower > exact - 0.1 && (upper - exact).abs() < 0.05, "{line}");
+        assert!(numbers(&found["direction"])[0] > 0.98, "{line}");
+    }
+    assert!(solid[2]["penetration"].is_null(), "{solid:?}");
+    let hollow = place.ok(&asked).json();
+    assert!(
+        numbers(&hollow[0]["penetration"]["direction"])[0] < -0.98,
+        "the other side is nearer: {hollow:?}"
+    );
+    assert!(hollow[1]["penetration"].is_null(), "{hollow:?}");
+    let words = place.ok(&[&asked[..6], &["--solid"]].concat()).results;
+    assert!(words.contains("Moving it by 0.5"), "{words}");
+    let refused = place.run(&["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--penetration"]);
+    assert!(refused.status == 2 && refused.errors.contains("add --surface"), "{}", refused.errors);
+}
