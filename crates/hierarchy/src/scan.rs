@@ -5,6 +5,7 @@ pub(crate) mod apart;
 pub(crate) mod arrays;
 pub(crate) mod build;
 pub(crate) mod cells;
+pub(crate) mod clearance;
 pub(crate) mod closing;
 pub(crate) mod data;
 pub(crate) mod deform_error;

@@ -41,6 +41,13 @@ pub(crate) const ROUNDING: f32 = 3e-6;
 pub const SLACK: f32 = 4e-6;
 
 impl OrientedBox {
+    /// The least and the greatest corner of a box along the coordinate axes about this one, a little larger.
+    pub(crate) fn upright(&self) -> [[f64; 3]; 2] {
+        let half = [0, 1, 2]
+            .map(|k| (0..3).map(|j| f64::from(self.axes[j][k].abs()) * f64::from(self.half[j])).sum::<f64>());
+        [-1.0, 1.0].map(|sign| [0, 1, 2].map(|k| f64::from(self.centre[k]) + sign * 1.000_001 * half[k]))
+    }
+
     /// Returns the smallest box along `axes` that contains an interval on each axis, grown by the
     /// rounding error.
     #[inline]

@@ -53,11 +53,7 @@ impl NodeGrid {
     #[must_use]
     pub fn new(tree: &Tree<'_>, sampling_radius: f64, points: usize, level: Level) -> Option<Self> {
         let root = tree.enclosure(Part::Obstacle, NodeId::ROOT);
-        let centre = root.centre.map(f64::from);
-        let half = [0, 1, 2]
-            .map(|k| (0..3).map(|j| f64::from(root.axes[j][k].abs()) * f64::from(root.half[j])).sum::<f64>());
-        let corner = |sign: f64| [0, 1, 2].map(|k| centre[k] + sign * 1.000_001 * half[k]);
-        let (min, max) = (corner(-1.0), corner(1.0));
+        let [min, max] = root.upright();
         if !min.iter().chain(&max).all(|c| c.is_finite()) {
             return None;
         }

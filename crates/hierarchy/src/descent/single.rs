@@ -56,6 +56,22 @@ impl Tree<'_> {
         self.descend_from(level, &Starts::ROOT, place, visitor)
     }
 
+    /// Visits a single leaf. Does nothing if the node is not a leaf.
+    pub fn visit_leaf<V: PlaceVisitor>(
+        &self,
+        level: Level,
+        leaf: NodeId,
+        visitor: &mut V,
+    ) -> ControlFlow<()> {
+        if !self.topology.is_leaf(leaf) {
+            return ControlFlow::Continue(());
+        }
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || visitor.leaf(simd, self.topology.leaf_number(leaf)),
+        ))
+    }
+
     /// Does the same as [`Self::descend_to`] for the leaves below some nodes.
     pub fn descend_from<V: PlaceVisitor>(
         &self,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::{NodeGrid, PointHierarchy};
+use nearmiss_hierarchy::{ClearanceGrid, NodeGrid, PointHierarchy};
 use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
 
 /// An index of the points and nodes of a scan, for testing thousands of shapes against its points
@@ -18,6 +18,8 @@ pub struct ShapeIndex {
     scan: u64,
     boxes: Arc<BlockBoxes>,
     pub(crate) cells: BlockGrid,
+    /// Lower bounds of the distance from the obstacle; `None` if some enclosure is unbounded.
+    pub(crate) clear: Option<Arc<ClearanceGrid>>,
     /// The nodes near each cell; `None` if some enclosure is unbounded.
     pub(crate) nodes: Option<Arc<NodeGrid>>,
     pub(crate) level: Level,
@@ -32,7 +34,8 @@ impl ShapeIndex {
         let cells = boxes.over(scan.blocks()).cells(level);
         let radius = f64::from(scan.arrays().sampling_radius);
         let nodes = NodeGrid::new(&scan.tree(), radius, scan.len(), level).map(Arc::new);
-        Self { scan: scan.outline().identity, boxes, cells, nodes, level }
+        let clear = ClearanceGrid::new(&scan.arrays()).map(Arc::new);
+        Self { scan: scan.outline().identity, boxes, cells, clear, nodes, level }
     }
 
     /// Returns `true` if this is the index of `scan`.

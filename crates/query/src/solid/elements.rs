@@ -4,7 +4,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{LeafBlock, NodeGrid, Part, SLAB, ScanArrays, Starts, THICKNESS};
+use nearmiss_hierarchy::{ClearanceGrid, LeafBlock, NodeGrid, Part, SLAB, ScanArrays, Starts, THICKNESS};
 use nearmiss_lanes::wide::bits;
 
 use crate::ask::answer::Evidence;
@@ -36,6 +36,8 @@ pub(crate) enum Element {
 pub(crate) struct Elements<'a> {
     pub(crate) placed: Placed<'a>,
     pub(crate) arrays: ScanArrays<'a>,
+    /// The clearance at each place, if the scan has a shape index and the obstacle counts.
+    pub(crate) clear: Option<&'a ClearanceGrid>,
     /// The nodes near each place, if the scan has a shape index and the obstacle or points count.
     pub(crate) nodes: Option<&'a NodeGrid>,
     /// The detail of contacts.
@@ -115,6 +117,10 @@ impl<'a> Elements<'a> {
         Self {
             placed,
             arrays,
+            clear: placed
+                .shapes()
+                .and_then(|index| index.clear.as_deref())
+                .filter(|_| options.semantics == Semantics::Obstacle),
             nodes: placed.shapes().and_then(|index| index.nodes.as_deref()).filter(|_| is_listed),
             detail: options.detail,
             semantics: options.semantics,
@@ -207,6 +213,15 @@ impl<'a> Elements<'a> {
             _ => f64::from(self.radius(i)),
         };
         Element::Ball(centre, radius)
+    }
+
+    /// The measured point `i`, in the stored frame, if it is in a shape and points are part of the obstacle.
+    #[inline]
+    pub(crate) fn held(&self, solid: &Solid<'_>, i: usize) -> Option<Vector> {
+        let point = self.position(i);
+        let is_held =
+            self.semantics == Semantics::Obstacle && solid.distance(&point) <= solid.radius + self.margin;
+        is_held.then_some(point)
     }
 
     /// The nearest points of a core and the part of a point, less its ball. Also the distance up to

@@ -54,9 +54,11 @@ pub(crate) fn touch(
         verdict: ShapeVerdict::Separated { evidence },
         band: elements.greatest_band(),
     };
-    let starts = elements.starts(solid, elements.margin);
-    if starts.is_empty() {
-        return separated(elements.of_separation(false));
+    if let Some(grid) = elements.clear {
+        let centre = solid.centre.into();
+        if grid.clearance(centre) > elements.margin + solid.radius + solid.half.norm() {
+            return separated(elements.of_separation(false));
+        }
     }
     let detail = elements.detail;
     let mut near = Near::new(elements, solid, elements.certifies);
@@ -64,7 +66,13 @@ pub(crate) fn touch(
     let (met, certified) = ([None; TRIES], None);
     let mut search = Touch { near, detail, met, count: 0, certified, undersampled: false, doubtful: false };
     // An early end means that the question is settled.
-    let _settled = near.descend(level, &starts, &mut search);
+    if search.near_leaf(level).is_continue() {
+        let starts = elements.starts(solid, elements.margin);
+        if starts.is_empty() {
+            return separated(elements.of_separation(false));
+        }
+        let _settled = near.descend(level, &starts, &mut search);
+    }
     let touching = |met: Met, point, evidence| ShapeAnswer {
         verdict: ShapeVerdict::Touching { point, source: elements.placed.scan().id(met.i), evidence },
         band: elements.band(met.i),
@@ -90,6 +98,19 @@ pub(crate) fn touch(
 }
 
 impl Touch<'_, '_> {
+    /// Compares the shape with the leaf that the grid names at its centre. Most shapes that touch are settled
+    /// by it.
+    #[inline]
+    fn near_leaf(&mut self, level: Level) -> ControlFlow<()> {
+        let Near { elements, solid, .. } = self.near;
+        let leaf = elements.clear.and_then(|grid| grid.leaf(solid.centre.into()));
+        let Some(leaf) = leaf else { return ControlFlow::Continue(()) };
+        elements.arrays.tree.visit_leaf(level, leaf, self)?;
+        // The leaf is visited again.
+        (self.met, self.count, self.doubtful) = ([None; TRIES], 0, false);
+        ControlFlow::Continue(())
+    }
+
     /// Compares the shape with the part of a point.
     fn compare(&mut self, i: usize) -> ControlFlow<()> {
         let Near { elements, solid, .. } = self.near;
@@ -119,14 +140,8 @@ impl Touch<'_, '_> {
     /// Ends the search if a measured point is in the shape: points are part of the obstacle.
     fn hold(&mut self, i: usize) -> ControlFlow<()> {
         let Near { elements, solid, .. } = self.near;
-        let point = elements.position(i);
-        if elements.semantics == Semantics::Obstacle
-            && solid.distance(&point) <= solid.radius + elements.margin
-        {
-            self.certified = Some(Met { i, point });
-            return ControlFlow::Break(());
-        }
-        ControlFlow::Continue(())
+        self.certified = elements.held(solid, i).map(|point| Met { i, point });
+        if self.certified.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
