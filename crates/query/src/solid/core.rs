@@ -332,6 +332,25 @@ impl<'a> Solid<'a> {
         }
     }
 
+    /// The nearest points of the core and a triangle; any two points if their distance exceeds `beyond`.
+    pub(crate) fn triangle_gap(&self, corners: &[Vector; 3], beyond: f64) -> Closest {
+        // Relative to a corner, so that rounding is relative to the distance.
+        let origin = corners[0];
+        let own = corners.map(|corner| corner - origin);
+        if let Core::Point = self.core {
+            let place = self.centre - origin;
+            let foot = Vector::from(nearest_on_triangle(&own.map(Into::into), place.into()));
+            let distance = (place - foot).norm();
+            let error = 1e-14 * own.iter().fold(place.amax(), |most, corner| most.max(corner.amax()));
+            let lower = (distance * (1.0 - 1e-9) - error).max(0.0);
+            return Closest { points: [self.centre, foot + origin], distance, lower };
+        }
+        let start = self.inside - origin - (own[1] + own[2]) / 3.0;
+        let support = |d: &Vector| [self.support(d) - origin, extreme(own.into_iter(), &-d)];
+        let Closest { points, distance, lower } = closest(support, start, beyond);
+        Closest { points: points.map(|p| p + origin), distance, lower }
+    }
+
     /// The nearest points of the core and a disc, if each is soon the point nearest to the other.
     /// Otherwise the difference of the last two.
     fn projected(&self, disc: &FlatDisc) -> Result<Gap, Vector> {

@@ -1,8 +1,11 @@
 //! Validated options for a scan and convex shapes.
 
 use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_surface::Metric;
 
+use crate::ask::answer::Evidence;
 use crate::ask::options::{CollideOptions, CollidePlan, Method, PlanError};
+use crate::distance::DistancePlan;
 
 /// A validated question about a scan and [shapes](crate::Shape) or [rays](crate::Ray). It serves
 /// every scan of the same [metric](PointHierarchy::metric), in any pose.
@@ -33,6 +36,15 @@ impl ShapePlan {
             return Err(PlanError::NotForShapes(what));
         }
         Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
+    }
+
+    /// The plan for the distance of a scan and a shape, with the meaning of one for two scans.
+    pub(crate) fn of_distance(plan: &DistancePlan) -> Self {
+        let options = *plan.touching().options();
+        // As a plan of collisions is validated.
+        let proves = options.metric != Some(Metric::Geodesic);
+        let evidence = if proves { Evidence::Certified } else { Evidence::Estimated };
+        Self { options: options.with_evidence(evidence) }
     }
 
     /// The options that were validated, with the metric of the scan.
