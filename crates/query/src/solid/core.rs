@@ -261,10 +261,11 @@ impl<'a> Solid<'a> {
             Core::Segment | Core::Box => (0..3)
                 .fold(self.centre, |p, k| p + self.axes[k] * self.half[k].copysign(d.dot(&self.axes[k]))),
             Core::Round(radii) => {
-                let axis = self.axes[1];
-                let across = d - axis * axis.dot(d);
-                let length = across.norm();
-                let out = if length > 0.0 { across / length } else { Vector::zeros() };
+                let [first, axis, second] = self.axes;
+                // By both components: what `d` has across the axis may be no more than rounding.
+                let (x, z) = (d.dot(&first), d.dot(&second));
+                let length = (x * x + z * z).sqrt();
+                let out = if length > 0.0 { (first * x + second * z) / length } else { Vector::zeros() };
                 let [low, high] = [-1.0, 1.0].map(|side: f64| {
                     let radius = radii[usize::from(side > 0.0)];
                     self.centre + axis * (side * self.half.y) + out * radius

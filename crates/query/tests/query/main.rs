@@ -22,6 +22,7 @@ mod orders;
 mod outputs;
 mod penetration;
 mod rays;
+mod shape_pairs;
 mod shape_worlds;
 mod shapes;
 mod solid_contacts;
