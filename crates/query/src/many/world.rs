@@ -110,6 +110,40 @@ pub enum Bodies<'a> {
 /// assert_eq!(meets.filter(|&meets| meets).count(), 2, "the lower tip meets the floor and the upper tip");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// With shapes, a link of a robot can consist of several bodies, which move together:
+///
+/// ```
+/// use nearmiss_geometry::{PointCloud, Pose};
+/// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+/// use nearmiss_query::{Bodies, BodyId, DistanceOptions, DistancePlan, Scratch, Shape, World};
+///
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let floor = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let plan = DistancePlan::new(&DistanceOptions::default(), &floor, &floor)?;
+///
+/// let mut world = World::with_shapes();
+/// let room = world.insert(&floor, &Pose::IDENTITY);
+/// let rod = Shape::Capsule { ends: [[0.0; 3], [0.0, 0.0, 0.3]], radius: 0.02 };
+/// let foot = Shape::Box { pose: Pose::IDENTITY, half: [0.1, 0.1, 0.01], radius: 0.0 };
+/// // The bodies of the link, and their poses in its frame.
+/// let link = [(rod, [0.0; 3]), (foot, [0.0, 0.0, -0.05])].map(|(shape, offset)| {
+///     let offset = Pose::from_translation(offset);
+///     (world.insert_shape(shape, &offset), offset)
+/// });
+/// let pose = Pose::from_translation([0.5, 0.5, 0.4]);
+/// for (id, offset) in &link {
+///     world.move_to(*id, &pose.after(offset));
+/// }
+/// // The bodies of the link belong together, so their pair is ignored.
+/// let counts = |a: BodyId, _: BodyId| a == room;
+/// let found = world.nearest_pair(Bodies::All, f64::INFINITY, counts, &plan, &mut Scratch::default());
+/// let nearest = found.expect("two pairs count");
+/// assert_eq!(nearest.ids, [room, link[1].0]);
+/// assert!(nearest.lower > 0.3 && (nearest.upper - 0.34).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct World<S, M = Infallible, H = Infallible> {
     bodies: BTreeMap<BodyId, Entry<S, M, H>>,
