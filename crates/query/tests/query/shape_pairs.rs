@@ -180,7 +180,7 @@ fn to_all(shape: &Shape<'_>, mesh: &TriangleMesh, at: &Pose) -> f64 {
 fn distances_from_meshes_are_those_of_the_nearest_triangle() {
     let rng = &mut rng(6101);
     let meshes = [cube(1), cube(9), soup(400, rng), soup(3, rng)];
-    let hierarchies = meshes.each_ref().map(|mesh| prepared(mesh));
+    let hierarchies = meshes.each_ref().map(prepared);
     let scratch = &mut Scratch::default();
     let (mut touching, mut beyond) = (0, 0);
     for round in 0..1800_u32 {

@@ -65,9 +65,10 @@ fn crowd<'a>(
     }
     let (id, body, _) = known.remove(2);
     assert!(matches!(body, Body::Shape(_)) && world.remove(id).is_none(), "not removed as a scan");
-    assert!(matches!(world.body(id), Some(PlacedBody::Shape(_))) && world.placed(id).is_none());
-    assert!(matches!(world.remove_body(id), Some(Body::Shape(_))) && world.body(id).is_none());
-    assert_eq!(world.len(), known.len());
+    let is_shape = matches!(world.body(id), Some(PlacedBody::Shape(_)));
+    assert!(is_shape && world.placed(id).is_none(), "it is still there, as a shape alone");
+    let is_removed = matches!(world.remove_body(id), Some(Body::Shape(_)));
+    assert!(is_removed && world.body(id).is_none() && world.len() == known.len(), "it is removed");
     (world, known)
 }
 
