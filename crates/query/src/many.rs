@@ -1,6 +1,7 @@
-//! Batches of questions and worlds of many scans and meshes.
+//! Batches of questions and worlds of many scans, meshes and shapes.
 
 pub(crate) mod batch;
 pub(crate) mod body;
+pub(crate) mod bounds;
 pub(crate) mod nearest;
 pub(crate) mod world;

@@ -1,6 +1,7 @@
 //! Convex shapes and rays against the obstacle of a scan.
 
 pub(crate) mod answer;
+pub(crate) mod as_shape;
 pub(crate) mod between;
 pub(crate) mod cast;
 pub(crate) mod closest;
@@ -16,6 +17,7 @@ pub(crate) mod inner;
 pub(crate) mod lanes;
 pub(crate) mod meeting;
 pub(crate) mod place;
+pub(crate) mod placed;
 pub(crate) mod plan;
 pub(crate) mod ray;
 pub(crate) mod ray_lanes;

@@ -262,7 +262,7 @@ fn worlds_follow_a_scan_that_changes() {
     let long: Vec<[f64; 3]> = points.iter().map(|[x, y, z]| [2.5 * x + 1.5, *y, *z]).collect();
     let moved = world.change(a, |body| match body {
         Body::Scan(scan) => Some(scan.move_to(&long)),
-        Body::Mesh(_) => None,
+        Body::Mesh(_) | Body::Shape(_) => None,
     });
     assert!(
         moved.flatten().unwrap().is_ok_and(|renewal| renewal != Renewal::Refitted),

@@ -3,11 +3,12 @@
 use nearmiss_geometry::Aabb;
 
 use crate::distance::DistancePlan;
-use crate::many::body::BodyPair;
+use crate::many::body::BodyDistance;
 use crate::many::world::{Bodies, BodyId, World};
 use crate::mesh::prepared::PreparedMesh;
 use crate::pair::prepared::Prepared;
 use crate::question::Scratch;
+use crate::solid::as_shape::AsShape;
 
 /// The two bodies that are nearest to each other, and bounds of the least distance of all pairs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,14 +23,14 @@ pub struct NearestPair {
     pub upper: f64,
 }
 
-impl<S: Prepared, M: PreparedMesh> World<S, M> {
+impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
     /// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within
     /// `reach`, which may be infinite. `counts` leaves pairs out, such as neighbouring links of a robot.
     /// `None` if no pair counts.
     ///
     /// Pairs are compared in the order of the gaps between their boxes, until a gap exceeds the least
-    /// distance. Pairs with an invalid pose are left out, as their distance is unknown. `plan` is for any
-    /// two scans of the world, or for one of them and a mesh ([`DistancePlan::against_mesh`]).
+    /// distance. Pairs with an invalid pose or shape are left out, as their distance is unknown. `plan` is
+    /// that of [`BodyPair::distance`](crate::BodyPair::distance).
     ///
     /// ```
     /// use nearmiss_geometry::{PointCloud, Pose};
@@ -71,11 +72,8 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
             if best.is_some_and(|best| gap > best.upper) {
                 break;
             }
-            let Some(pair) = self.body_pair(ids) else { continue };
-            let (lower, upper, points) = distance(&pair, plan, scratch);
-            if !upper.is_finite() {
-                continue;
-            }
+            let found = self.body_pair(ids).and_then(|pair| pair.distance(plan, scratch));
+            let Some(BodyDistance { lower, upper, points }) = found else { continue };
             let lower = best.map_or(lower, |best| best.lower.min(lower));
             best = Some(match best {
                 Some(best) if best.upper <= upper => NearestPair { lower, ..best },
@@ -93,24 +91,5 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
         let squared: f64 = (0..3).map(|k| beyond(k, &a, &b).powi(2)).sum();
         // Less than rounding could take away.
         squared.sqrt() * (1.0 - 1e-4)
-    }
-}
-
-/// Returns the bounds of the distance of a pair, and a point of each.
-fn distance(pair: &BodyPair<'_>, plan: &DistancePlan, scratch: &mut Scratch) -> (f64, f64, [[f64; 3]; 2]) {
-    match pair {
-        BodyPair::Scans(pair) => {
-            let found = pair.distance(plan, scratch);
-            (found.lower, found.upper, found.points)
-        }
-        BodyPair::MeshAndScan { pair, mesh_is_first } => {
-            let found = pair.distance(plan, scratch);
-            let [of_scan, of_mesh] = found.points;
-            (found.lower, found.upper, if *mesh_is_first { [of_mesh, of_scan] } else { [of_scan, of_mesh] })
-        }
-        BodyPair::Meshes(pair) => {
-            let found = pair.distance(scratch.meshes());
-            (found.lower, found.upper, found.points)
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! Many scans and meshes in one world, and the broad phase that finds the pairs that may meet.
+//! Many scans, meshes and shapes in one world, and the broad phase that finds the pairs that may meet.
 //!
 //! An R*-tree over world-space boxes prunes the pairs that are further apart than the reach of a
 //! question. It is that of the crate `rstar` (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree:
@@ -7,21 +7,20 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 
-use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{Aabb, NodeId, Pose};
-use nearmiss_hierarchy::{OrientedBox, Part, SLACK};
+use nearmiss_geometry::{Aabb, Pose};
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 use serde::{Deserialize, Serialize};
 
 use crate::many::body::{Body, BodyPair, PlacedBody};
+use crate::many::bounds::{bounds, bounds_of_body, is_moderate};
 use crate::mesh::prepared::PreparedMesh;
 use crate::pair::placed::Placed;
-use crate::pair::placed_balls::is_proper;
 use crate::pair::prepared::Prepared;
 use crate::question::Pair;
+use crate::solid::as_shape::AsShape;
 use crate::solid::shape::Shape;
 
-/// The id of a placed scan or mesh in a [`World`]. Ids increase and are never reused, even after removals.
+/// The id of a body in a [`World`]. Ids increase and are never reused, even after removals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct BodyId(pub u64);
 
@@ -35,12 +34,13 @@ pub enum Bodies<'a> {
     These(&'a [BodyId]),
 }
 
-/// Placed scans and meshes, each a *body* with an id.
+/// Placed scans, meshes and convex shapes, each a *body* with an id.
 ///
 /// `S` is what holds a preprocessed scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its
 /// graph and kernel are included. One scan may be placed many times. `M` is what holds a preprocessed
-/// mesh, likewise; a world made with [`World::new`] has none, one made with [`World::with_meshes`] has
-/// both.
+/// mesh, likewise, and `H` what holds a convex shape ([`AsShape`]). A world made with [`World::new`] has
+/// scans alone. [`World::with_meshes`], [`World::with_shapes`] and [`World::with_meshes_and_shapes`] make
+/// worlds of several kinds of bodies.
 ///
 /// ```
 /// use nearmiss_geometry::{PointCloud, Pose};
@@ -105,13 +105,48 @@ pub enum Bodies<'a> {
 ///     BodyPair::Scans(pair) => pair.collide(&plan, &mut scratch).verdict.is_intersecting(),
 ///     BodyPair::MeshAndScan { pair, .. } => pair.collide(&of_mesh, &mut scratch).verdict.is_intersecting(),
 ///     BodyPair::Meshes(pair) => pair.collide(scratch.meshes()).verdict.is_intersecting(),
+///     _ => false, // A shape: there is none.
 /// });
 /// assert_eq!(meets.filter(|&meets| meets).count(), 2, "the lower tip meets the floor and the upper tip");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// With shapes, a link of a robot can consist of several bodies, which move together:
+///
+/// ```
+/// use nearmiss_geometry::{PointCloud, Pose};
+/// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+/// use nearmiss_query::{Bodies, BodyId, DistanceOptions, DistancePlan, Scratch, Shape, World};
+///
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let floor = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let plan = DistancePlan::new(&DistanceOptions::default(), &floor, &floor)?;
+///
+/// let mut world = World::with_shapes();
+/// let room = world.insert(&floor, &Pose::IDENTITY);
+/// let rod = Shape::Capsule { ends: [[0.0; 3], [0.0, 0.0, 0.3]], radius: 0.02 };
+/// let foot = Shape::Box { pose: Pose::IDENTITY, half: [0.1, 0.1, 0.01], radius: 0.0 };
+/// // The bodies of the link, and their poses in its frame.
+/// let link = [(rod, [0.0; 3]), (foot, [0.0, 0.0, -0.05])].map(|(shape, offset)| {
+///     let offset = Pose::from_translation(offset);
+///     (world.insert_shape(shape, &offset), offset)
+/// });
+/// let pose = Pose::from_translation([0.5, 0.5, 0.4]);
+/// for (id, offset) in &link {
+///     world.move_to(*id, &pose.after(offset));
+/// }
+/// // The bodies of the link belong together, so their pair is ignored.
+/// let counts = |a: BodyId, _: BodyId| a == room;
+/// let found = world.nearest_pair(Bodies::All, f64::INFINITY, counts, &plan, &mut Scratch::default());
+/// let nearest = found.expect("two pairs count");
+/// assert_eq!(nearest.ids, [room, link[1].0]);
+/// assert!(nearest.lower > 0.3 && (nearest.upper - 0.34).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
-pub struct World<S, M = Infallible> {
-    bodies: BTreeMap<BodyId, Entry<S, M>>,
+pub struct World<S, M = Infallible, H = Infallible> {
+    bodies: BTreeMap<BodyId, Entry<S, M, H>>,
     /// The bounding boxes of the bodies that have one.
     tree: RTree<Leaf>,
     /// The other bodies, which count as near everything.
@@ -120,18 +155,15 @@ pub struct World<S, M = Infallible> {
 }
 
 #[derive(Debug, Clone)]
-struct Entry<S, M> {
-    body: Body<S, M>,
+struct Entry<S, M, H> {
+    body: Body<S, M, H>,
     pose: Pose,
     bounds: Option<Aabb>,
 }
 
-impl<S: Prepared, M: PreparedMesh> Entry<S, M> {
-    fn new(body: Body<S, M>, pose: &Pose) -> Self {
-        let bounds = match body.at(pose) {
-            PlacedBody::Scan(scan) => bounds(&scan),
-            PlacedBody::Mesh(mesh) => bounds_of(mesh.mesh().arrays().tree.root_box(), mesh.stored_to_world()),
-        };
+impl<S: Prepared, M: PreparedMesh, H: AsShape> Entry<S, M, H> {
+    fn new(body: Body<S, M, H>, pose: &Pose) -> Self {
+        let bounds = bounds_of_body(&body.at(pose));
         Self { body, pose: *pose, bounds }
     }
 
@@ -165,7 +197,7 @@ impl RTreeObject for Leaf {
     }
 }
 
-impl<S, M> Default for World<S, M> {
+impl<S, M, H> Default for World<S, M, H> {
     fn default() -> Self {
         Self { bodies: BTreeMap::new(), tree: RTree::new(), unbounded: BTreeSet::new(), next: 0 }
     }
@@ -185,6 +217,22 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
     pub fn with_meshes() -> Self {
         Self::default()
     }
+}
+
+impl<S: Prepared, H: AsShape> World<S, Infallible, H> {
+    /// Creates a world without bodies, for scans and convex shapes.
+    #[must_use]
+    pub fn with_shapes() -> Self {
+        Self::default()
+    }
+}
+
+impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
+    /// Creates a world without bodies, for scans, meshes and convex shapes.
+    #[must_use]
+    pub fn with_meshes_and_shapes() -> Self {
+        Self::default()
+    }
 
     /// Places `scan` at `pose`, which maps the frame of its input to the world. O(log n).
     pub fn insert(&mut self, scan: S, pose: &Pose) -> BodyId {
@@ -196,8 +244,13 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
         self.insert_body(Body::Mesh(mesh), pose)
     }
 
-    /// Places a scan or a mesh. O(log n).
-    pub fn insert_body(&mut self, body: Body<S, M>, pose: &Pose) -> BodyId {
+    /// Places `shape` at `pose`, which maps the frame in which the shape is given to the world. O(log n).
+    pub fn insert_shape(&mut self, shape: H, pose: &Pose) -> BodyId {
+        self.insert_body(Body::Shape(shape), pose)
+    }
+
+    /// Places a scan, a mesh or a shape. O(log n).
+    pub fn insert_body(&mut self, body: Body<S, M, H>, pose: &Pose) -> BodyId {
         let id = BodyId(self.next);
         self.next += 1;
         self.place(id, Entry::new(body, pose));
@@ -206,17 +259,17 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
 
     /// Removes a scan and returns it; `None` if no scan has this id. O(log n).
     pub fn remove(&mut self, id: BodyId) -> Option<S> {
-        if matches!(self.bodies.get(&id)?.body, Body::Mesh(_)) {
+        if !matches!(self.bodies.get(&id)?.body, Body::Scan(_)) {
             return None;
         }
         match self.remove_body(id)? {
             Body::Scan(scan) => Some(scan),
-            Body::Mesh(_) => None,
+            Body::Mesh(_) | Body::Shape(_) => None,
         }
     }
 
     /// Removes a body and returns what it is; `None` if no body has this id. O(log n).
-    pub fn remove_body(&mut self, id: BodyId) -> Option<Body<S, M>> {
+    pub fn remove_body(&mut self, id: BodyId) -> Option<Body<S, M, H>> {
         let entry = self.bodies.remove(&id)?;
         match entry.bounds {
             Some(bounds) => _ = self.tree.remove(&Leaf::new(id, &bounds)),
@@ -233,7 +286,7 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
 
     /// Changes a body, as a deforming one changes in every frame, and returns the result of `change`;
     /// `None` if no body has this id. O(log n) besides.
-    pub fn change<R>(&mut self, id: BodyId, change: impl FnOnce(&mut Body<S, M>) -> R) -> Option<R> {
+    pub fn change<R>(&mut self, id: BodyId, change: impl FnOnce(&mut Body<S, M, H>) -> R) -> Option<R> {
         let pose = self.bodies.get(&id)?.pose;
         let mut body = self.remove_body(id)?;
         let changed = change(&mut body);
@@ -241,7 +294,7 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
         Some(changed)
     }
 
-    fn place(&mut self, id: BodyId, entry: Entry<S, M>) {
+    fn place(&mut self, id: BodyId, entry: Entry<S, M, H>) {
         match entry.bounds {
             Some(bounds) => self.tree.insert(Leaf::new(id, &bounds)),
             None => _ = self.unbounded.insert(id),
@@ -278,11 +331,11 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
     pub fn placed(&self, id: BodyId) -> Option<Placed<'_>> {
         match self.body(id)? {
             PlacedBody::Scan(scan) => Some(scan),
-            PlacedBody::Mesh(_) => None,
+            PlacedBody::Mesh(_) | PlacedBody::Shape(_) => None,
         }
     }
 
-    /// Returns a pair of scans, or `None` if one of them does not exist or is a mesh.
+    /// Returns a pair of scans, or `None` if one of them does not exist or is no scan.
     #[must_use]
     pub fn pair(&self, [a, b]: [BodyId; 2]) -> Option<Pair<'_>> {
         Some(Pair::new(self.placed(a)?, self.placed(b)?))
@@ -306,8 +359,8 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
     ///
     /// All other pairs are separated by more than `reach`; pass
     /// [`CollidePlan::reach`](crate::CollidePlan::reach) for a collision query. A body with an
-    /// invalid pose ([`Reason::Pose`](crate::Reason::Pose)), or at the limits of double precision,
-    /// counts as near every other body.
+    /// invalid pose ([`Reason::Pose`](crate::Reason::Pose)) or shape, or at the limits of double
+    /// precision, counts as near every other body.
     ///
     /// Takes about 0.5 µs per body on one thread if each is near twelve others. Does not allocate
     /// once `pairs` is warm.
@@ -368,7 +421,7 @@ impl<S: Prepared, M: PreparedMesh> World<S, M> {
     /// Writes the bodies whose bounding boxes come within `reach` of `shape` to `ids`, in ascending
     /// order. No other body [touches](Placed::touches) the shape.
     pub fn near_shape(&self, shape: &Shape<'_>, reach: f64, ids: &mut Vec<BodyId>) {
-        let bounds = shape.bounds().filter(|b| b.min.iter().chain(&b.max).all(|x| x.abs() <= FARTHEST));
+        let bounds = shape.bounds().filter(is_moderate);
         self.near_bounds(bounds, reach, ids);
     }
 
@@ -425,53 +478,4 @@ fn visit_across(
 fn are_near(a: &Envelope, b: &Envelope, reach: f64) -> bool {
     let (low_a, high_a, low_b, high_b) = (a.lower(), a.upper(), b.lower(), b.upper());
     (0..3).all(|k| low_a[k] <= high_b[k] + reach && low_b[k] <= high_a[k] + reach)
-}
-
-/// Rounding error of a point far from the world's origin in double precision: twice the allowance
-/// of a query.
-const DOUBLE_ROUNDING: f64 = 4e-15;
-
-/// Beyond this, the volumes of boxes leave the range of double precision.
-const FARTHEST: f64 = 1e100;
-
-/// Scans whose stored frames are scaled up or down by more than this count as unbounded. The others
-/// then differ by at most the 2⁶⁰ that single queries allow.
-const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
-
-impl Placed<'_> {
-    /// Returns a bounding box, in the world, of all that a query compares: discs and balls of the scan,
-    /// and the surface between them. `None` if the pose is invalid or out of range.
-    #[must_use]
-    pub fn bounds(&self) -> Option<Aabb> {
-        bounds(self)
-    }
-}
-
-/// The world-space bounding box of all parts of a scan that a query compares, enlarged by half of
-/// the rounding error that the query allows for. `None` if the pose is invalid or out of range.
-fn bounds(view: &Placed<'_>) -> Option<Aabb> {
-    bounds_of(&view.scan().tree().enclosure(Part::Surface, NodeId::ROOT), view.stored_to_world())
-}
-
-/// The same for a thing that is within `root` in its stored frame, which is `placed` in the world.
-fn bounds_of(root: &OrientedBox, placed: &Pose) -> Option<Aabb> {
-    let scale = placed.scale();
-    let centre = placed.apply(root.centre.map(f64::from));
-    let edges = [0, 1, 2].map(|j: usize| {
-        let half = f64::from(root.half[j]) * scale;
-        placed.rotate(root.axes[j].map(f64::from)).map(|x| (x * half).abs())
-    });
-    // A query in single precision allows for SLACK times the coordinates of either scan about the
-    // other's origin. For two scans whose boxes touch, these are at most twice the distances of
-    // both centres from their origins plus four radii of each.
-    let own = Vector3::from(root.centre.map(f64::from)).norm();
-    let single = f64::from(SLACK) * (2.0 * own + 4.0 * f64::from(root.radius())) * scale;
-    let far = Vector3::from(placed.translation()).norm() + Vector3::from(centre).norm();
-    let more = single + DOUBLE_ROUNDING * far;
-    let half = [0, 1, 2].map(|k: usize| edges.iter().map(|edge| edge[k]).sum::<f64>() + more);
-    let bounds =
-        Aabb { min: [0, 1, 2].map(|k| centre[k] - half[k]), max: [0, 1, 2].map(|k| centre[k] + half[k]) };
-    let is_finite = bounds.min.iter().chain(&bounds.max).all(|x| x.abs() <= FARTHEST);
-    let is_moderate = (1.0 / GREATEST_SCALE..=GREATEST_SCALE).contains(&scale);
-    (is_finite && is_moderate && is_proper(placed)).then_some(bounds)
 }

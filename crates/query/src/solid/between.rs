@@ -38,21 +38,26 @@ impl Shape<'_> {
     #[must_use]
     pub fn gap_to(&self, other: &Shape<'_>) -> Option<ShapeGap> {
         let [a, b] = [Solid::new(self, &Pose::IDENTITY)?, Solid::new(other, &Pose::IDENTITY)?];
-        // Relative to the first, so that rounding is relative to the distance.
-        let origin = a.centre;
-        let support = |d: &Vector3<f64>| [a.support(d) - origin, b.support(&-d) - origin];
-        let Closest { points, distance, lower } = closest(support, a.inside - b.inside, f64::INFINITY);
-        let radii = a.radius + b.radius;
-        let way = points[1] - points[0];
-        let along = way.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
-        // Neither beyond the other.
-        let share = if radii > distance && radii > 0.0 { distance / radii } else { 1.0 };
-        let on_a = points[0] + along * (a.radius * share) + origin;
-        let on_b = points[1] - along * (b.radius * share) + origin;
-        Some(ShapeGap {
-            lower: (lower - radii).max(0.0),
-            upper: (distance - radii).max(0.0),
-            points: [on_a.into(), on_b.into()],
-        })
+        Some(gap(&a, &b))
+    }
+}
+
+/// Bounds the distance of two shapes in one frame.
+pub(crate) fn gap(a: &Solid<'_>, b: &Solid<'_>) -> ShapeGap {
+    // Relative to the first, so that rounding is relative to the distance.
+    let origin = a.centre;
+    let support = |d: &Vector3<f64>| [a.support(d) - origin, b.support(&-d) - origin];
+    let Closest { points, distance, lower } = closest(support, a.inside - b.inside, f64::INFINITY);
+    let radii = a.radius + b.radius;
+    let way = points[1] - points[0];
+    let along = way.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+    // Neither beyond the other.
+    let share = if radii > distance && radii > 0.0 { distance / radii } else { 1.0 };
+    let on_a = points[0] + along * (a.radius * share) + origin;
+    let on_b = points[1] - along * (b.radius * share) + origin;
+    ShapeGap {
+        lower: (lower - radii).max(0.0),
+        upper: (distance - radii).max(0.0),
+        points: [on_a.into(), on_b.into()],
     }
 }

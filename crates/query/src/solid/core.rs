@@ -270,10 +270,11 @@ impl<'a> Solid<'a> {
             Core::Segment | Core::Box => (0..3)
                 .fold(self.centre, |p, k| p + self.axes[k] * self.half[k].copysign(d.dot(&self.axes[k]))),
             Core::Round(radii) => {
-                let axis = self.axes[1];
-                let across = d - axis * axis.dot(d);
-                let length = across.norm();
-                let out = if length > 0.0 { across / length } else { Vector::zeros() };
+                let [first, axis, second] = self.axes;
+                // By both components: what `d` has across the axis may be no more than rounding.
+                let (x, z) = (d.dot(&first), d.dot(&second));
+                let length = (x * x + z * z).sqrt();
+                let out = if length > 0.0 { (first * x + second * z) / length } else { Vector::zeros() };
                 let [low, high] = [-1.0, 1.0].map(|side: f64| {
                     let radius = radii[usize::from(side > 0.0)];
                     self.centre + axis * (side * self.half.y) + out * radius
@@ -372,6 +373,25 @@ impl<'a> Solid<'a> {
             }
             Core::Hull(..) | Core::Own(..) => self.iterated(disc, self.inside - disc.centre, beyond),
         }
+    }
+
+    /// The nearest points of the core and a triangle; any two points if their distance exceeds `beyond`.
+    pub(crate) fn triangle_gap(&self, corners: &[Vector; 3], beyond: f64) -> Closest {
+        // Relative to a corner, so that rounding is relative to the distance.
+        let origin = corners[0];
+        let own = corners.map(|corner| corner - origin);
+        if let Core::Point = self.core {
+            let place = self.centre - origin;
+            let foot = Vector::from(nearest_on_triangle(&own.map(Into::into), place.into()));
+            let distance = (place - foot).norm();
+            let error = 1e-14 * own.iter().fold(place.amax(), |most, corner| most.max(corner.amax()));
+            let lower = (distance * (1.0 - 1e-9) - error).max(0.0);
+            return Closest { points: [self.centre, foot + origin], distance, lower };
+        }
+        let start = self.inside - origin - (own[1] + own[2]) / 3.0;
+        let support = |d: &Vector| [self.support(d) - origin, extreme(own.into_iter(), &-d)];
+        let Closest { points, distance, lower } = closest(support, start, beyond);
+        Closest { points: points.map(|p| p + origin), distance, lower }
     }
 
     /// The nearest points of the core and a disc, if each is soon the point nearest to the other.

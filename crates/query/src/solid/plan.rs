@@ -5,6 +5,7 @@ use nearmiss_surface::Metric;
 
 use crate::ask::answer::Evidence;
 use crate::ask::options::{CollideOptions, CollidePlan, Detail, Method, PlanError};
+use crate::distance::DistancePlan;
 
 /// A validated question about a scan and [shapes](crate::Shape) or [rays](crate::Ray). It serves
 /// every scan of the same [metric](PointHierarchy::metric), in any pose.
@@ -37,13 +38,21 @@ impl ShapePlan {
         Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
     }
 
-    /// A plan for one scan of a pair, with its meaning of contact. Distances are proven if the metric allows
-    /// it, and nothing evaluates the implicit function.
+    /// The plan for one scan of a pair, with its meaning of contact. Nothing evaluates the implicit function.
     pub(crate) fn of_pair(plan: &CollidePlan) -> Self {
-        let options = plan.options().with_detail(Detail::Verdict);
-        let is_proven = options.metric != Some(Metric::Geodesic);
-        let evidence = if is_proven { Evidence::Certified } else { Evidence::Estimated };
-        Self { options: CollideOptions { evidence, ..options } }
+        Self::proving(plan.options().with_detail(Detail::Verdict))
+    }
+
+    /// The plan for the distance of a scan and a shape, with the meaning of one for two scans.
+    pub(crate) fn of_distance(plan: &DistancePlan) -> Self {
+        Self::proving(*plan.touching().options())
+    }
+
+    /// The plan with these options, with which distances are proven if the metric allows it.
+    fn proving(options: CollideOptions) -> Self {
+        let proves = options.metric != Some(Metric::Geodesic);
+        let evidence = if proves { Evidence::Certified } else { Evidence::Estimated };
+        Self { options: options.with_evidence(evidence) }
     }
 
     /// The options that were validated, with the metric of the scan.

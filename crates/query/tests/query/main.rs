@@ -23,6 +23,8 @@ mod outputs;
 mod penetration;
 mod rays;
 mod scan_penetration;
+mod shape_pairs;
+mod shape_worlds;
 mod shapes;
 mod solid_contacts;
 mod solid_sweeps;

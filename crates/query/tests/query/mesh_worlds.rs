@@ -239,6 +239,7 @@ fn meets(pair: BodyPair<'_>, plan: &CollidePlan, of_mesh: &MeshScanPlan, scratch
         BodyPair::Scans(pair) => pair.collide(plan, scratch).verdict.is_intersecting(),
         BodyPair::MeshAndScan { pair, .. } => pair.collide(of_mesh, scratch).verdict.is_intersecting(),
         BodyPair::Meshes(pair) => pair.collide(scratch.meshes()).verdict.is_intersecting(),
+        _ => unreachable!("there are no shapes"),
     }
 }
 

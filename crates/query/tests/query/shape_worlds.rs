@@ -1,0 +1,250 @@
+//! Worlds with convex shapes against loops over all pairs.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, MeshHierarchy, PointHierarchy};
+use nearmiss_query::{
+    AsShape, Bodies, Body, BodyId, BodyPair, CollideOptions, DistanceOptions, DistancePlan, PlacedBody,
+    PlacedShape, Prepared, PreparedMesh, Reason, Scratch, Shape, ShapePlan, ShapeScanPair, ShapeVerdict,
+    World,
+};
+use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+use rand::RngExt;
+
+use crate::shape_pairs::{Ellipsoid, Owned, SCANS, cube, pose, prepared};
+
+type Random = rand_xoshiro::Xoshiro256PlusPlus;
+
+/// What a body of the test is, and its pose.
+type Known = (BodyId, Body<usize, (), Owned>, Pose);
+
+type TestWorld<'a> = World<&'a PointHierarchy, &'a MeshHierarchy, Arc<Owned>>;
+
+fn placed<'a>((_, body, pose): &'a Known, mesh: &'a MeshHierarchy) -> PlacedBody<'a> {
+    match body {
+        Body::Scan(which) => PlacedBody::Scan(SCANS[*which].at(pose)),
+        Body::Mesh(()) => PlacedBody::Mesh(mesh.at(pose)),
+        Body::Shape(shape) => PlacedBody::Shape(shape.at(pose)),
+    }
+}
+
+/// A world of scans, meshes and shapes that has changed a few times.
+fn crowd<'a>(
+    mesh: &'a MeshHierarchy,
+    count: u32,
+    spread: f64,
+    rng: &mut Random,
+) -> (TestWorld<'a>, Vec<Known>) {
+    let mut world = World::with_meshes_and_shapes();
+    let mut known = Vec::new();
+    for i in 0..count {
+        let at = pose(spread, rng);
+        known.push(match i % 5 {
+            0 => (world.insert(&SCANS[i as usize % 2], &at), Body::Scan(i as usize % 2), at),
+            1 => (world.insert_mesh(mesh, &at), Body::Mesh(()), at),
+            _ => {
+                let shape = Owned::random(rng.random_range(0..9), rng);
+                (world.insert_shape(Arc::new(shape.clone()), &at), Body::Shape(shape), at)
+            }
+        });
+    }
+    for i in (0..known.len()).step_by(3) {
+        let at = pose(spread, rng);
+        assert!(world.move_to(known[i].0, &at), "it exists");
+        known[i].2 = at;
+    }
+    for i in (0..known.len()).step_by(4) {
+        if matches!(known[i].1, Body::Shape(_)) {
+            let other = Owned::random(rng.random_range(0..9), rng);
+            let changed = world.change(known[i].0, |body| *body = Body::Shape(Arc::new(other.clone())));
+            assert!(changed.is_some(), "it exists");
+            known[i].1 = Body::Shape(other);
+        }
+    }
+    let (id, body, _) = known.remove(2);
+    assert!(matches!(body, Body::Shape(_)) && world.remove(id).is_none(), "not removed as a scan");
+    let is_shape = matches!(world.body(id), Some(PlacedBody::Shape(_)));
+    assert!(is_shape && world.placed(id).is_none(), "it is still there, as a shape alone");
+    let is_removed = matches!(world.remove_body(id), Some(Body::Shape(_)));
+    assert!(is_removed && world.body(id).is_none() && world.len() == known.len(), "it is removed");
+    (world, known)
+}
+
+#[test]
+fn worlds_of_all_kinds_find_every_near_pair_and_the_nearest() {
+    let rng = &mut rng(6104);
+    let mesh = prepared(&cube(4));
+    let plan = DistancePlan::new(&DistanceOptions::default(), &SCANS[0], &SCANS[1]).unwrap();
+    let scratch = &mut Scratch::default();
+    let (mut kinds, mut left_out) = ([0; 6], 0);
+    for round in 0..12_u32 {
+        let spread = [3.0, 8.0, 20.0][round as usize % 3];
+        let (world, known) = crowd(&mesh, 26, spread, rng);
+        let reach = [0.0, 0.3, 1.5][round as usize / 3 % 3];
+        let mut near = Vec::new();
+        world.near_pairs(Bodies::All, reach, &mut near);
+        let counts = |a: BodyId, b: BodyId| !(a.0 + b.0).is_multiple_of(4);
+        let (mut by, mut of_counting) = (Vec::new(), (f64::INFINITY, f64::INFINITY));
+        world.near_pairs_by(Bodies::All, 1.5, |a, b| counts(a, b).then_some(reach), &mut by);
+        assert!(near.iter().filter(|pair| counts(pair[0], pair[1])).eq(&by), "a reach for each pair");
+        for (j, b) in known.iter().enumerate() {
+            for a in &known[..j] {
+                let expected = BodyPair::new(placed(a, &mesh), placed(b, &mesh)).distance(&plan, scratch);
+                let found = world.body_pair([a.0, b.0]).unwrap().distance(&plan, scratch);
+                assert_eq!(found, expected, "{a:?}, {b:?}");
+                let found = found.unwrap();
+                let context = format!("{found:?}, {a:?}, {b:?}");
+                if found.upper > 0.0 {
+                    for (k, of) in [a, b].into_iter().enumerate() {
+                        let bounds = world.bounds(of.0).unwrap();
+                        let more = 1e-6;
+                        let inside = |x: [f64; 3]| {
+                            (0..3).all(|k| x[k] >= bounds.min[k] - more && x[k] <= bounds.max[k] + more)
+                        };
+                        assert!(inside(found.points[k]), "the order of the points, {context}");
+                    }
+                }
+                if found.upper <= reach {
+                    assert!(near.contains(&[a.0, b.0]), "left out, {context}");
+                    let kind = |body: &Known| match body.1 {
+                        Body::Scan(_) => 0,
+                        Body::Mesh(()) => 1,
+                        Body::Shape(_) => 2,
+                    };
+                    let [low, high] = [kind(a).min(kind(b)), kind(a).max(kind(b))];
+                    kinds[[0, 1, 2, 0, 3, 4, 0, 0, 5][3 * low + high]] += 1;
+                } else {
+                    left_out += u32::from(!near.contains(&[a.0, b.0]));
+                }
+                if counts(a.0, b.0) {
+                    let (lower, upper) = of_counting;
+                    of_counting = (found.lower.min(lower), found.upper.min(upper));
+                }
+            }
+        }
+        let found = world.nearest_pair(Bodies::All, f64::INFINITY, counts, &plan, scratch).unwrap();
+        assert_eq!(found.upper, of_counting.1, "{found:?}");
+        assert!(found.lower >= of_counting.0 && found.lower <= found.upper, "{found:?}, {of_counting:?}");
+        let nearest = world.body_pair(found.ids).unwrap().distance(&plan, scratch).unwrap();
+        assert_eq!((nearest.upper, nearest.points), (found.upper, found.points));
+    }
+    assert!(kinds.iter().all(|&count| count > 3) && left_out > 1000, "{kinds:?} near, {left_out} pruned");
+}
+
+#[test]
+fn no_shape_touches_a_scan_beyond_the_broad_phase() {
+    let rng = &mut rng(6105);
+    let scratch = &mut Scratch::default();
+    let grid = (0..30).flat_map(|i| (0..30).map(move |j| [0.05 * f64::from(i), 0.05 * f64::from(j), 0.0]));
+    let floor = PointCloud::from_positions(&grid.collect::<Vec<_>>()).unwrap();
+    let floor = PointHierarchy::build(&floor, &BuildOptions::default()).unwrap();
+    let (mut touching, mut pairs) = ([0; 2], Vec::new());
+    for round in 0..3000_u32 {
+        let is_flat = round % 2 == 0;
+        let scan = if is_flat { &floor } else { &SCANS[round as usize / 2 % 2] };
+        let plan = ShapePlan::new(&CollideOptions::default(), scan).unwrap();
+        // Just beside the scan. The box of the floor is flat, its discs have a thickness.
+        let of_scan = if is_flat { Pose::from_translation(point_in(rng, 1.0)) } else { pose(1.0, rng) };
+        let centre = of_scan.apply(scan.bounds().centre());
+        let (out, off) = if is_flat {
+            ([0.0, 0.0, 1.0], rng.random_range(0.0..0.005))
+        } else {
+            let most = scan.bounds().half_extents().iter().fold(0.0_f64, |a, b| a.max(*b));
+            (unit_vector(rng), most * of_scan.scale() + rng.random_range(-0.1..0.02))
+        };
+        let at = Pose::from_translation([0, 1, 2].map(|k| centre[k] + out[k] * (0.3 + off)));
+        let mut world = World::with_shapes();
+        let a = world.insert(scan, &of_scan);
+        let b = world.insert_shape(Shape::Sphere { centre: [0.0; 3], radius: 0.3 }, &at);
+        world.near_pairs(Bodies::All, 0.0, &mut pairs);
+        let Some(BodyPair::ShapeAndScan { pair, shape_is_first: false }) = world.body_pair([a, b]) else {
+            panic!("a scan and a shape");
+        };
+        if pair.touch(&plan, scratch).verdict.is_touching() {
+            touching[usize::from(is_flat)] += 1;
+            assert_eq!(pairs, [[a, b]], "{off}: {:?}", pair.distance(&plan, f64::INFINITY, scratch));
+        }
+    }
+    assert!(touching.iter().all(|&count| count > 100), "{touching:?} touch");
+}
+
+#[test]
+fn invalid_shapes_and_poses_are_near_everything_and_have_no_distance() {
+    let mesh = prepared(&cube(2));
+    let scratch = &mut Scratch::default();
+    let ball = Shape::Sphere { centre: [0.0; 3], radius: 0.5 };
+    let plan = ShapePlan::new(&CollideOptions::default(), &SCANS[0]).unwrap();
+    let of_distance = DistancePlan::new(&DistanceOptions::default(), &SCANS[0], &SCANS[0]).unwrap();
+    let nan = f64::NAN;
+    let corners = [[0.0, nan, 0.0]];
+    let broken = Ellipsoid { half: [nan; 3], pose: Pose::IDENTITY };
+    let invalid: Vec<(Shape<'_>, Pose)> = vec![
+        (Shape::Sphere { centre: [0.0; 3], radius: -1.0 }, Pose::IDENTITY),
+        (Shape::Sphere { centre: [nan, 0.0, 0.0], radius: 1.0 }, Pose::IDENTITY),
+        (Shape::Sphere { centre: [f64::INFINITY, 0.0, 0.0], radius: 1.0 }, Pose::IDENTITY),
+        (Shape::Hull { points: &[], radius: 0.1 }, Pose::IDENTITY),
+        (Shape::Hull { points: &corners, radius: 0.1 }, Pose::IDENTITY),
+        (Shape::Own { map: &broken, radius: 0.1 }, Pose::IDENTITY),
+        (ball, Pose::from_translation([nan, 0.0, 0.0])),
+        (ball, Pose::from_translation([0.0, f64::INFINITY, 0.0])),
+        (ball, Pose::IDENTITY.with_scale(0.0)),
+        (ball, Pose::IDENTITY.with_scale(-1.0)),
+        (ball, Pose::IDENTITY.with_scale(nan)),
+        (ball, Pose::from_axis_angle([1.0, 0.0, 0.0], nan)),
+    ];
+    let mut contacts = vec![];
+    for (i, (shape, at)) in invalid.iter().enumerate() {
+        let mut world = World::with_meshes_and_shapes();
+        let others = [
+            world.insert(&SCANS[0], &Pose::IDENTITY),
+            world.insert_mesh(&mesh, &Pose::from_translation([100.0, 0.0, 0.0])),
+            world.insert_shape(*shape, at),
+            world.insert_shape(ball, &Pose::from_translation([200.0, 0.0, 0.0])),
+        ];
+        let id = others[2];
+        assert!(world.bounds(id).is_none(), "{i}");
+        let mut near = Vec::new();
+        world.near_pairs(Bodies::All, 0.0, &mut near);
+        assert_eq!(near, [[others[0], id], [others[1], id], [id, others[3]]], "{i}");
+        for other in [others[0], others[1], others[3]] {
+            for pair in [[id, other], [other, id]] {
+                assert_eq!(world.body_pair(pair).unwrap().distance(&of_distance, scratch), None, "{i}");
+            }
+        }
+        let nearest = world.nearest_pair(Bodies::All, f64::INFINITY, |_, _| true, &of_distance, scratch);
+        assert!(nearest.is_some_and(|nearest| !nearest.ids.contains(&id)), "{i}: {nearest:?}");
+        let pair = ShapeScanPair::new(SCANS[0].at(&Pose::IDENTITY), PlacedShape::new(*shape, at));
+        let expected = if i < 6 { Reason::Shape } else { Reason::Pose };
+        assert_eq!(pair.touch(&plan, scratch).verdict, ShapeVerdict::Undecided(expected), "{i}");
+        pair.contacts(&plan, &mut contacts, scratch);
+        assert!(contacts.is_empty() && pair.distance(&plan, f64::INFINITY, scratch).is_none(), "{i}");
+        // Once it is valid, it is an ordinary body.
+        world.change(id, |body| *body = Body::Shape(ball));
+        assert!(world.move_to(id, &Pose::from_translation([300.0, 0.0, 0.0])));
+        world.near_pairs(Bodies::All, 0.0, &mut near);
+        assert!(near.is_empty() && world.bounds(id).is_some(), "{i}");
+    }
+    // The scan, the mesh, or the other shape at an invalid pose.
+    let bad = Pose::IDENTITY.with_scale(nan);
+    let own = ball.at(&Pose::IDENTITY);
+    for pair in [
+        BodyPair::new(PlacedBody::Scan(SCANS[0].at(&bad)), PlacedBody::Shape(own)),
+        BodyPair::new(PlacedBody::Shape(own), PlacedBody::Mesh(mesh.at(&bad))),
+        BodyPair::new(PlacedBody::Shape(own), PlacedBody::Shape(ball.at(&bad))),
+    ] {
+        assert_eq!(pair.distance(&of_distance, scratch), None);
+    }
+    // A world of shapes alone.
+    let mut world: World<&PointHierarchy, Infallible, Shape<'_>> = World::with_shapes();
+    let ids = [0.0, 0.9, 5.0].map(|x| world.insert_shape(ball, &Pose::from_translation([x, 0.0, 0.0])));
+    let mut near = Vec::new();
+    world.near_pairs(Bodies::All, 0.0, &mut near);
+    assert_eq!(near, [[ids[0], ids[1]]]);
+    let mut beside = Vec::new();
+    world.near_shape(&ball, 4.1, &mut beside);
+    assert_eq!(beside, ids);
+    world.near_shape(&ball, 0.0, &mut beside);
+    assert_eq!(beside, ids[..2]);
+}
