@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::contacts::{GroupReport, Grouped, SHOWN};
 use crate::digits::{count, place, rough, short, work};
+use crate::evidence::word;
 use crate::penetration::PenetrationReport;
 
 /// The JSON output of `collide`.
@@ -258,11 +259,4 @@ impl AnswerReport {
 /// Returns a clause that names two items by their numbers.
 pub(crate) fn between([of_a, of_b]: [&str; 2], [a, b]: [u32; 2]) -> String {
     format!("between {of_a} {a} of a and {of_b} {b} of b (counted from 0)")
-}
-
-pub(crate) fn word(evidence: Evidence) -> &'static str {
-    match evidence {
-        Evidence::Certified => "certified",
-        Evidence::Estimated => "estimated",
-    }
 }

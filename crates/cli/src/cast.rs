@@ -10,10 +10,10 @@ use nearmiss::{CollideOptions, Detail, Ray, RayAnswer, Scratch, ShapePlan, Targe
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use crate::answer_report::word;
 use crate::console::{Console, Results, now, warn};
 use crate::digits::{percent, place, rounded};
 use crate::error::CliError;
+use crate::evidence::word;
 use crate::input::Opening;
 use crate::json_lines::JsonLines;
 use crate::parse::parse_radius;

@@ -7,7 +7,6 @@ use clap::Args;
 use nearmiss::{Budget, Deadline, Distance, DistanceOptions, DistancePlan, Pose, Scan, Scratch, Semantics};
 use serde::Serialize;
 
-use crate::answer_report::word;
 use crate::as_mesh::AsMeshName;
 use crate::bodies::Bodies;
 use crate::console::{Console, Results, now};
@@ -15,6 +14,7 @@ use crate::digits::{rough, short, work};
 use crate::distance_picture::paint_distance;
 use crate::error::CliError;
 use crate::eval::KernelName;
+use crate::evidence::word;
 use crate::meaning::MeaningArgs;
 use crate::mesh::distance::DistanceQuestion;
 use crate::parse::{parse_duration, parse_work};

@@ -13,6 +13,7 @@ mod density;
 mod distance;
 mod error;
 mod eval;
+mod evidence;
 mod export;
 mod inspect;
 mod mesh;

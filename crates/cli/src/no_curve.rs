@@ -6,9 +6,10 @@ use nearmiss::{
     Scratch, Semantics, Statistics, Verdict,
 };
 
-use crate::answer_report::{AnswerReport, word};
+use crate::answer_report::AnswerReport;
 use crate::console::now;
 use crate::digits::{place, rough, rounded_down};
+use crate::evidence::word;
 use crate::sentence::world_radius;
 
 /// Answers for two scans without a curve, each with its time in µs.

@@ -4,8 +4,8 @@ use clap::ValueEnum;
 use nearmiss::{Evidence, Interior, Penetration};
 use serde::Serialize;
 
-use crate::answer_report::word;
 use crate::digits::{rounded, rounded_down, short};
+use crate::evidence::word;
 
 /// The names of the scans whose inside counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -8,7 +8,7 @@ use nearmiss::hierarchy::{NodePair, OrientedBox, Part};
 use nearmiss::{Answer, CollideOptions, Evidence, Placed, Proof, Semantics, Verdict};
 use serde::Serialize;
 
-use crate::answer_report::word;
+use crate::evidence::word;
 
 /// A line of the file.
 #[derive(Serialize)]

@@ -7,8 +7,8 @@ use nearmiss::{
 };
 
 use crate::advice;
-use crate::answer_report::word;
 use crate::digits::{percent, place, rough, rounded, rounded_down, short};
+use crate::evidence::word;
 use crate::picture::stored_index;
 
 /// Returns the answer to a question with these `options`, as a sentence. It states a clearance only if

@@ -219,9 +219,9 @@ impl<'a> Pair<'a> {
     ///
     /// Both bounds are valid whenever the budget ends the search. The upper one comes from a shift that was
     /// tested, and is a local minimum: a shorter shift may exist in a direction that was not tried. The lower
-    /// one comes from a place that is common to both scans: one inside both, or a measured point of one inside
-    /// the other. So it is 0 if neither scan is solid, except for thickened points. Distances from surfaces are
-    /// proven; rays decide which places are inside (docs/theory/penetration.md).
+    /// one comes from a place that is common to both scans: one inside both, or a measured point of one
+    /// inside the other. So it is 0 if neither scan is solid, except for thickened points. Distances from
+    /// surfaces are proven; rays decide which places are inside (docs/theory/penetration.md).
     ///
     /// The method, order and coverings of the plan and the resolution of the budget are ignored. Costs some
     /// 200 to 500 boolean queries. Does not allocate once `scratch` is warm.

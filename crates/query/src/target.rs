@@ -221,8 +221,8 @@ impl<'a> Target<'a> {
     }
 
     /// Bounds the penetration of a shape and the scan: how far the shape must at least be shifted, in any
-    /// direction, to be separate from the scan. Separate means that [`touch`](Self::touch) separates them, with
-    /// the margin of the plan, and that the shape is not inside the scan if that is
+    /// direction, to be separate from the scan. Separate means that [`touch`](Self::touch) separates them,
+    /// with the margin of the plan, and that the shape is not inside the scan if that is
     /// [solid](Interior::Solid). The shift out of a hollow scan may lead to either side of a surface.
     ///
     /// Both bounds are valid whenever `budget` ends the search; a test of the shape counts as one unit of

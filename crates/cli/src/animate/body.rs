@@ -14,8 +14,8 @@ use nearmiss::{
 
 use super::frames::Frames;
 use super::solid::Solid;
-use crate::answer_report::word;
 use crate::error::CliError;
+use crate::evidence::word;
 use crate::input::{self, Opening};
 use crate::picture::splat;
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use nearmiss::{Clash, ClashKind, ClashPlan, Clashes, Contact, Placed};
 use serde::Serialize;
 
-use crate::answer_report::word;
+use crate::evidence::word;
 use crate::sentence::unit;
 
 /// A clash list with its inputs and plan.

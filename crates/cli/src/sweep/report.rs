@@ -3,8 +3,8 @@
 use nearmiss::{Contact, Evidence, SweepAnswer, SweepReason, SweepVerdict};
 use serde::Serialize;
 
-use crate::answer_report::word;
 use crate::digits::{count, place, rough, rounded_down, short, work};
+use crate::evidence::word;
 
 /// The JSON output of `sweep`. Times count lines from the first one, which is at 0.
 #[derive(Debug, Serialize)]

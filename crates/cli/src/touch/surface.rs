@@ -6,10 +6,10 @@ use nearmiss::{
 };
 use serde::Serialize;
 
-use crate::answer_report::word;
 use crate::console::{Results, now};
 use crate::digits::{place, rough, rounded_down, short};
 use crate::error::CliError;
+use crate::evidence::word;
 use crate::penetration::{PenetrationReport, penetration_sentence};
 use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;

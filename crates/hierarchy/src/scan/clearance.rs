@@ -37,8 +37,8 @@ const SHARE: usize = 16;
 /// No leaf is near: the root is none.
 const NONE: NodeId = NodeId::ROOT;
 
-/// A grid with the *clearance* of each cell, a lower bound of the distance of its centre from the obstacle, and a
-/// leaf that is near.
+/// A grid with the *clearance* of each cell, a lower bound of the distance of its centre from the obstacle,
+/// and a leaf that is near.
 #[derive(Debug, Clone)]
 pub struct ClearanceGrid {
     cubes: Cubes,
@@ -49,8 +49,8 @@ pub struct ClearanceGrid {
 }
 
 impl ClearanceGrid {
-    /// Builds the grid of a scan from the enclosures of its leaves. `None` if one of these is unbounded, or if
-    /// many are near many cells. O(n).
+    /// Builds the grid of a scan from the enclosures of its leaves. `None` if one of these is unbounded, or
+    /// if many are near many cells. O(n).
     #[must_use]
     pub fn new(scan: &ScanArrays<'_>) -> Option<Self> {
         #[expect(clippy::cast_precision_loss, reason = "a count")]
@@ -86,8 +86,8 @@ impl ClearanceGrid {
         Some(Self { cubes, clearances, leaves, step: most / STEPS })
     }
 
-    /// Returns a lower bound of the distance of a place from the obstacle. Zero, or less, if the obstacle may be
-    /// there. O(1).
+    /// Returns a lower bound of the distance of a place from the obstacle. Zero, or less, if the obstacle
+    /// may be there. O(1).
     #[inline]
     #[must_use]
     pub fn clearance(&self, place: [f64; 3]) -> f64 {
@@ -101,8 +101,8 @@ impl ClearanceGrid {
         }
     }
 
-    /// Returns a leaf that is near a place, if there is one: of those whose enclosures are nearest to the centre
-    /// of the cell, that with the nearest centre. O(1).
+    /// Returns a leaf that is near a place, if there is one: of those whose enclosures are nearest to the
+    /// centre of the cell, that with the nearest centre. O(1).
     #[inline]
     #[must_use]
     pub fn leaf(&self, place: [f64; 3]) -> Option<NodeId> {
@@ -111,7 +111,7 @@ impl ClearanceGrid {
     }
 }
 
-/// What building takes.
+/// The data that building takes.
 struct Build<'s> {
     tree: &'s Tree<'s>,
     cubes: &'s Cubes,
@@ -165,7 +165,8 @@ impl Build<'_> {
         (cells.iter().map(stored).collect(), cells.iter().map(|cell| cell.leaf).collect())
     }
 
-    /// The cells, within some slabs, whose centres may be near a box, along each axis; `None` if there are none.
+    /// The cells, within some slabs, whose centres may be near a box, along each axis; `None` if there are
+    /// none.
     fn near(&self, bounds: &OrientedBox, slabs: &Range<usize>) -> Option<[Range<usize>; 3]> {
         let (size, within) = (self.cubes.size(), self.most + 2.0 * self.lost);
         let [min, max] = bounds.upright();
@@ -205,8 +206,8 @@ mod tests {
     use super::*;
     use crate::{BuildOptions, PointHierarchy};
 
-    /// Of random places, the clearance is at most the distance from the enclosures of all leaves, and the leaf of
-    /// each cell is the nearest one.
+    /// The clearance of a random place is at most the distance from the enclosures of all leaves, and the
+    /// leaf of its cell is the nearest one.
     #[test]
     fn clearances_are_bounds_and_leaves_are_near() {
         let rng = &mut rng(9401);

@@ -1,4 +1,4 @@
-//! What is inside a scan that encloses a solid.
+//! The inside of a scan that encloses a solid.
 
 use fearless_simd::Level;
 

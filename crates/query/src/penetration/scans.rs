@@ -210,7 +210,7 @@ impl Probe for ScanProbe<'_> {
         if complete { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 
-    /// Of a scan without inside, the measured point nearest to the place counts.
+    /// The place is moved to the nearest measured point of a scan without inside.
     fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
         if self.solid == [false; 2] {
             return ControlFlow::Continue(None);

@@ -65,7 +65,8 @@ impl ShapeProbe<'_, '_> {
         touch(self.elements, Some(&self.solid.shifted(&t)), (self.level, &mut *self.scratch))
     }
 
-    /// A shift away from the centre of the scan after which the shape touches nothing; `None` if there is none.
+    /// A shift away from the centre of the scan after which the shape touches nothing; `None` if there is
+    /// none.
     fn out_of_ball(&mut self) -> Option<Vector> {
         let bounds = self.elements.arrays.tree.root_box();
         let centre = Vector::from(bounds.centre.map(f64::from));
@@ -128,7 +129,7 @@ impl Probe for ShapeProbe<'_, '_> {
         ControlFlow::Continue(())
     }
 
-    /// Of a scan without inside, the measured point nearest to the place counts.
+    /// The place is moved to the nearest measured point of a scan without inside.
     fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
         self.go_on()?;
         self.spent.evaluations += 1;

@@ -1,6 +1,8 @@
 //! Contacts in brief: how many there are, where, and between which normals.
 
-use crate::penetration::probe::Vector;
+use nearmiss_geometry::nalgebra::Vector3;
+
+type Vector = Vector3<f64>;
 
 /// The contacts of two things in brief.
 #[derive(Debug, Clone, Default)]

@@ -330,8 +330,8 @@ impl<'a> Solid<'a> {
         Self { core, centre: self.centre + t, inside: self.inside + t, ..*self }
     }
 
-    /// How far `x` is inside the shape: a lower bound of its distance from the boundary, and the direction
-    /// away from there. `None` if it is outside.
+    /// The depth of `x` in the shape: a lower bound of its distance from the boundary, and the direction away
+    /// from there. `None` if it is outside.
     pub(crate) fn depth(&self, x: &Vector) -> Option<(f64, Vector)> {
         let on_core = self.nearest(x);
         let away = x - on_core;

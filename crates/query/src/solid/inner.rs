@@ -31,8 +31,9 @@ struct Polytope {
     counts: [usize; 2],
 }
 
-/// Returns a lower bound of the distance of the origin from the boundary of a convex shape that contains it,
-/// and the normal of the nearest face of the polytope. Zero if the shape is flat. `scale` is the size of the shape.
+/// Returns a lower bound of the distance of the origin from the boundary of a convex shape that contains
+/// it, and the normal of the nearest face of the polytope. Zero if the shape is flat. `scale` is the size
+/// of the shape.
 pub(crate) fn inner_depth(support: impl Fn(&Vector) -> Vector, scale: f64) -> (f64, Vector) {
     let flat = (0.0, Vector::zeros());
     let Some(mut polytope) = Polytope::new(&support, scale) else { return flat };
@@ -150,7 +151,7 @@ mod tests {
         *points.iter().max_by(|a, b| a.dot(d).total_cmp(&b.dot(d))).expect("there are points")
     }
 
-    /// Of random hulls, the depth is that of the nearest plane through three points that has all others on
+    /// The depth in a random hull is that of the nearest plane through three points that has all others on
     /// one side.
     #[test]
     fn depths_in_hulls() {

@@ -17,7 +17,7 @@ use crate::shape_pairs::{Ellipsoid, Owned, SCANS, cube, pose, prepared};
 
 type Random = rand_xoshiro::Xoshiro256PlusPlus;
 
-/// What a body of the test is, and its pose.
+/// A body of the test, its id and its pose.
 type Known = (BodyId, Body<usize, (), Owned>, Pose);
 
 type TestWorld<'a> = World<&'a PointHierarchy, &'a MeshHierarchy, Arc<Owned>>;
