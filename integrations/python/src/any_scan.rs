@@ -1,7 +1,7 @@
 //! Methods of `AnyScan`: the questions about scans, still or moving.
 
 use nearmiss::{
-    ClashOptions, ClashPlan, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, MeshScanPair,
+    ClashOptions, ClashPlan, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, Interior, MeshScanPair,
     MeshScanPlan, Pose, Prepared as _,
 };
 use pyo3::exceptions::PyRuntimeWarning;
@@ -257,6 +257,43 @@ impl AnyScan {
             }
         });
         array(py, found.iter().map(ManifoldRecord::new).collect())
+    }
+
+    /// Bound the length of the shortest move that takes `other`, at `pose`, out of this scan, at
+    /// `own_pose`. `solid` names the scans whose surface encloses a solid: "a" for this scan, "b" for
+    /// `other`, or "both".
+    ///
+    /// Returns (lower, upper, direction): `other` is free if it moves by `upper` along the direction,
+    /// and no move shorter than `lower` frees it. Both are 0 for separate scans; `lower` is 0 without a
+    /// solid scan. Options are those of `collide`.
+    #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
+    fn penetration(
+        &self,
+        other: &Bound<'_, Self>,
+        pose: Option<&Bound<'_, PyAny>>,
+        own_pose: Option<&Bound<'_, PyAny>>,
+        solid: Option<&str>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<(f64, f64, [f64; 3])> {
+        let interiors = match solid {
+            None => [Interior::Hollow, Interior::Hollow],
+            Some("a") => [Interior::Solid, Interior::Hollow],
+            Some("b") => [Interior::Hollow, Interior::Solid],
+            Some("both") => [Interior::Solid, Interior::Solid],
+            Some(name) => {
+                return Err(refused(format!(
+                    "expected `solid` to be \"a\", \"b\" or \"both\", got {name:?}"
+                )));
+            }
+        };
+        let (py, scans) = (other.py(), self.scans(other));
+        let options = Options::new(options, OF_SCANS, scans[0].metric())?;
+        let plan = CollidePlan::new(&options.collide, &scans[0], &scans[1]).map_err(refused)?;
+        let poses = poses_of(&scans, [own_pose, pose])?;
+        let found = ask(py, |scratch| {
+            pair_of(&scans, &poses).within(&options.budget()).penetration(&plan, interiors, scratch)
+        });
+        Ok((found.lower, found.upper, found.direction))
     }
 
     /// List the places where this scan, at `own_pose`, touches `other`, at `pose`, or comes nearer than

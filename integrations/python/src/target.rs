@@ -1,6 +1,6 @@
 //! `Target`: a placed scan against shapes and rays.
 
-use nearmiss::{CollideOptions, Pose, Prepared as _, Ray, Scratch, ShapePlan};
+use nearmiss::{Budget, CollideOptions, Interior, Pose, Prepared as _, Ray, Scratch, ShapePlan};
 use pyo3::prelude::*;
 
 use crate::arrays::{Points, vector, wrong_shape};
@@ -184,6 +184,21 @@ impl Target {
             None => now.target().contacts(&shape, &mut found, scratch),
         });
         array(py, found.iter().map(ShapeContactRecord::new).collect())
+    }
+
+    /// Bound the length of the shortest move that takes a shape out of the scan. With `solid`, the surface
+    /// of the scan encloses a solid; otherwise the way out may lead to either side.
+    ///
+    /// Returns (lower, upper, direction): the shape is free if it moves by `upper` along the direction,
+    /// and no move shorter than `lower` frees it. Both are 0 for a shape that touches nothing.
+    #[pyo3(signature = (shape, *, solid = false))]
+    fn penetration(&self, shape: &Bound<'_, Shape>, solid: bool) -> PyResult<(f64, f64, [f64; 3])> {
+        let (py, convex) = (shape.py(), shape.get().convex());
+        let now = self.now(py)?;
+        let interior = if solid { Interior::Solid } else { Interior::Hollow };
+        let found =
+            ask(py, |scratch| now.target().penetration(&convex, interior, &Budget::UNLIMITED, scratch));
+        Ok((found.lower, found.upper, found.direction))
     }
 
     /// Find the first place where a ray, or a ball of `radius` along it, hits the scan.

@@ -50,6 +50,25 @@ class Shapes(unittest.TestCase):
         self.assertEqual(len(ids), 1)
         hint.clear()
 
+    def test_penetration_is_the_way_out(self):
+        target = self.floor.target()
+        lower, upper, way = target.penetration(Shape.sphere([0.5, 0.5, 0.06], 0.1))
+        self.assertLessEqual(lower, 0.04 + 1e-9)
+        self.assertGreater(lower, 0.035)
+        self.assertAlmostEqual(upper, 0.04, 2)
+        self.assertGreater(way[2], 0.98)
+        self.assertEqual(target.penetration(Shape.sphere([0.5, 0.5, 0.3], 0.1))[:2], (0.0, 0.0))
+
+    def test_scans_move_apart(self):
+        near = nearmiss.pose(translation=[0.09, 0.03, 0.01])
+        lower, upper, way = dragon().penetration(dragon(), near, solid="both")
+        self.assertTrue(0 < lower <= upper < 0.1, (lower, upper))
+        moved = nearmiss.pose(translation=np.add([0.09, 0.03, 0.01], np.multiply(way, upper * (1 + 1e-6))))
+        self.assertFalse(dragon().collide(dragon(), moved).touches)
+        self.assertEqual(dragon().penetration(dragon(), near)[0], 0.0)
+        with self.assertRaisesRegex(ValueError, 'expected `solid` to be "a", "b" or "both", got "c"'):
+            dragon().penetration(dragon(), near, solid="c")
+
     def test_batches_equal_single_questions(self):
         target = dragon().target(poses(1, 1, 0.01)[0])
         rng = np.random.default_rng(3)

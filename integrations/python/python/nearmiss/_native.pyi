@@ -254,6 +254,15 @@ class AnyScan:
         own_pose: _Pose = None,
         **options: Unpack[_CollideOptions],
     ) -> _Records: ...
+    def penetration(
+        self,
+        other: AnyScan,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        solid: str | None = None,
+        **options: Unpack[_CollideOptions],
+    ) -> tuple[float, float, _Triple]: ...
     def manifold(
         self,
         other: AnyScan,
@@ -406,6 +415,7 @@ class Target:
     def distance(self, shape: Shape, within: SupportsFloat = ...) -> ShapeDistance: ...
     def distance_each(self, shapes: Sequence[Shape], within: SupportsFloat = ...) -> _Records: ...
     def contacts(self, shape: Shape, *, hint: ShapeHint | None = None) -> _Records: ...
+    def penetration(self, shape: Shape, *, solid: bool = False) -> tuple[float, float, _Triple]: ...
     def cast(
         self, origin: ArrayLike, direction: ArrayLike, *, max: SupportsFloat = ..., radius: SupportsFloat = 0.0
     ) -> RayAnswer: ...
