@@ -1,10 +1,14 @@
 //! Meshes and scans that deform: the times of refitting, renewing and preparing anew, and the answers
 //! of each. Frames of a depth camera that replace each other.
 //!
+//! Methods are compared frame by frame, so each finds what the others left in the caches. Rows that say
+//! "alone" are of a program that follows the same frames by one method, with the same questions about each.
+//!
 //! The frames of a mesh are files. A scan of it has points that are spread over the surface of the
 //! first frame and move with their triangles. Two copies are asked in every frame, at the same poses
 //! for all methods.
 
+use std::cell::RefCell;
 use std::hint::black_box;
 use std::path::PathBuf;
 
@@ -123,6 +127,22 @@ impl Times {
             println!("| {name} | {:.1} | {:.1} | {:.1} |", total / count(n), self.0[n / 2], self.0[n - 1]);
         }
     }
+}
+
+/// Follows frames by one method alone, with questions about each frame.
+fn alone<'f, F: 'f + ?Sized>(
+    name: &str,
+    frames: impl Iterator<Item = &'f F>,
+    mut follow: impl FnMut(&'f F) -> Result<(), Failure>,
+    mut ask: impl FnMut(&'f F) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut times = Times::default();
+    for frame in frames {
+        times.of(|| follow(frame))?;
+        ask(frame)?;
+    }
+    times.row(name);
+    Ok(())
 }
 
 fn heading(what: &str) {
@@ -284,6 +304,24 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
     heading(&format!("a scan of {} points", refitted.len()));
     let names = ["refit", "renew", "prepare anew", "ask, refitted", "ask, renewed", "ask, prepared anew"];
     times.into_iter().zip(names).for_each(|(times, name)| times.row(name));
+    for (name, by_refits) in [("refit, alone", true), ("renew, alone", false)] {
+        let scan = RefCell::new(MovingScan::new(&frames[0], &built)?);
+        let follow = |frame: &Vec<[f64; 3]>| {
+            let mut scan = scan.borrow_mut();
+            if by_refits {
+                scan.refit(frame).map(drop)?
+            } else {
+                scan.renew(frame)?
+            }
+            Ok(())
+        };
+        let ask = |_: &_| {
+            let scan = scan.borrow();
+            let about = about(&poses, scan.bounds().centre());
+            about.iter().try_for_each(|pose| ask(&scan, pose, &mut Times::default()).map(drop))
+        };
+        alone(name, frames.iter(), follow, ask)?;
+    }
     let Totals { differ, beyond, proven, apart, fitted, most, loosest } = totals;
     println!(
         "\n{differ:?} of {} verdicts of refitted and renewed scans differ from those prepared anew, {beyond:?} beyond the \
@@ -346,8 +384,10 @@ fn depth_frames(options: &Options) -> Result<(), Failure> {
     let [by_pixels, by_points, rebuild, ask_pixels, ask_points, ask_anew] = &mut times;
     let (mut scratch, mut totals) = (Scratch::default(), Totals::default());
     let asked = CollideOptions::default().with_evidence(Evidence::Certified);
+    let mut frames = Frames::new();
     for step in 0..FRAMES {
         let frame = depth_frame([width, height], 0.1 * f64::from(step), rng);
+        frames.push(frame.clone());
         by_pixels.of(|| organised.replace_organised(&frame, width as usize))?;
         by_points.of(|| unorganised.replace(&frame))?;
         let measured: Vec<[f64; 3]> = frame.iter().copied().filter(|p| p[2].is_finite()).collect();
@@ -392,11 +432,34 @@ fn depth_frames(options: &Options) -> Result<(), Failure> {
         "ask, by points",
         "ask, prepared anew",
     ];
-    let asked = times[3].0.len();
+    let count = times[3].0.len();
     times.into_iter().zip(names).for_each(|(times, name)| times.row(name));
+    for (name, by_pixels) in [("replaced by pixels, alone", true), ("replaced by points, alone", false)] {
+        let scan = RefCell::new(MovingScan::new(&first, &built)?);
+        let follow = |frame: &Vec<[f64; 3]>| {
+            let mut scan = scan.borrow_mut();
+            if by_pixels {
+                scan.replace_organised(frame, width as usize)?
+            } else {
+                scan.replace(frame)?
+            }
+            Ok(())
+        };
+        let ask = |frame: &Vec<[f64; 3]>| {
+            let scan = scan.borrow();
+            let plan = CollidePlan::new(&asked, &scan, &tool)?;
+            let step = frame.len() / options.poses.max(1) as usize;
+            for seen in frame.iter().step_by(step.max(1)).filter(|seen| seen[2].is_finite()) {
+                let tool = tool.at(&Pose::from_translation([seen[0], seen[1], seen[2] - 0.2]));
+                black_box(Pair::new(scan.at(&Pose::IDENTITY), tool).collide(&plan, &mut scratch));
+            }
+            Ok(())
+        };
+        alone(name, frames.iter(), follow, ask)?;
+    }
     let Totals { differ, beyond, proven, apart, .. } = totals;
     println!(
-        "\n{differ:?} of {asked} verdicts by pixels and by points differ from those prepared anew, {beyond:?} beyond the \
+        "\n{differ:?} of {count} verdicts by pixels and by points differ from those prepared anew, {beyond:?} beyond the \
          band; of {apart} separations {proven:?} are certified by each"
     );
     Ok(())
