@@ -8,6 +8,9 @@
 //! first frame and move with their triangles. Two copies are asked in every frame, at the same poses
 //! for all methods.
 
+mod depth;
+mod measured;
+
 use std::cell::RefCell;
 use std::hint::black_box;
 use std::path::PathBuf;
@@ -16,13 +19,15 @@ use nearmiss::io::{Pieces, read_in_pieces};
 use nearmiss::{
     Answer, BuildOptions, CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Evidence,
     MeshBuildOptions, MeshItself, MeshPair, MeshScratch, MovingMesh, MovingScan, Pair, Placed, Pose, Scratch,
-    TriangleMesh, Verdict,
+    TriangleMesh,
 };
-use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
 use rand::RngExt;
+
+use depth::depth_frames;
+use measured::{Frames, Times, Totals, alone, heading, is_proof};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
@@ -43,13 +48,10 @@ pub(crate) struct Options {
     seed: u64,
 }
 
-/// Positions of all frames.
-type Frames = Vec<Vec<[f64; 3]>>;
-
 pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}\n", machine::description());
     if options.frames.is_empty() {
-        return depth_frames(options);
+        return depth_frames(options.poses, options.seed);
     }
     let (files, triangles) = read(&options.frames)?;
     let mut frames = Frames::new();
@@ -107,46 +109,6 @@ fn about(poses: &[Pose], centre: [f64; 3]) -> Vec<Pose> {
         pose.with_translation([0, 1, 2].map(|k| centre[k] - from[k] + by[k]))
     };
     poses.iter().map(pose).collect()
-}
-
-/// Times in microseconds.
-#[derive(Debug, Default)]
-struct Times(Vec<f64>);
-
-impl Times {
-    fn of<R>(&mut self, work: impl FnOnce() -> R) -> R {
-        let (result, time) = timed(work);
-        self.0.push(nanoseconds(time) / 1e3);
-        result
-    }
-
-    fn row(mut self, name: &str) {
-        self.0.sort_by(f64::total_cmp);
-        let (n, total) = (self.0.len(), self.0.iter().sum::<f64>());
-        if n > 0 {
-            println!("| {name} | {:.1} | {:.1} | {:.1} |", total / count(n), self.0[n / 2], self.0[n - 1]);
-        }
-    }
-}
-
-/// Follows frames by one method alone, with questions about each frame.
-fn alone<'f, F: 'f + ?Sized>(
-    name: &str,
-    frames: impl Iterator<Item = &'f F>,
-    mut follow: impl FnMut(&'f F) -> Result<(), Failure>,
-    mut ask: impl FnMut(&'f F) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let mut times = Times::default();
-    for frame in frames {
-        times.of(|| follow(frame))?;
-        ask(frame)?;
-    }
-    times.row(name);
-    Ok(())
-}
-
-fn heading(what: &str) {
-    println!("\n## {what}\n\n| µs | mean | median | most |\n| --- | --: | --: | --: |");
 }
 
 fn meshes(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(), Failure> {
@@ -333,155 +295,6 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
     );
     by_looseness.print();
     Ok(())
-}
-
-/// A room as a depth camera sees it, with noise and holes: two walls, a floor, and balls that move.
-fn depth_frame([width, height]: [u32; 2], time: f64, rng: &mut impl rand::Rng) -> Vec<[f64; 3]> {
-    let focus = 0.82 * f64::from(width);
-    let balls = [
-        ([-0.5 + 0.3 * time.sin(), 0.3, 2.0], 0.5),
-        ([0.7, 0.6 - 0.2 * time.cos(), 2.6], 0.4),
-        ([0.2, -0.5, 1.5 + 0.1 * time], 0.2),
-    ];
-    let mut pixel = |i: u32| {
-        let (u, v) = (i % width, i / width);
-        let d = [f64::from(u) - 0.5 * f64::from(width), f64::from(v) - 0.5 * f64::from(height)]
-            .map(|x| x / focus);
-        let d = [d[0], d[1], 1.0];
-        let mut depth = 4.0_f64;
-        for (slope, away) in [(d[1], 1.2), (d[0], 2.0)] {
-            depth = if slope > 0.0 { depth.min(away / slope) } else { depth };
-        }
-        for (centre, radius) in balls {
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            let (dd, dc, cc) = (dot(d, d), dot(d, centre), dot(centre, centre) - radius * radius);
-            let root = dc * dc - dd * cc;
-            depth = if root > 0.0 { depth.min((dc - root.sqrt()) / dd) } else { depth };
-        }
-        let [noise, hole] = [rng.random::<f64>(), rng.random::<f64>()];
-        // Quadratic in the depth, as of cameras that triangulate.
-        let depth = depth + 5e-4 * depth * depth * (noise - 0.5);
-        if hole < 0.02 || (u / 40 + v / 40) % 11 == 0 { [f64::NAN; 3] } else { d.map(|x| x * depth) }
-    };
-    (0..width * height).map(&mut pixel).collect()
-}
-
-/// Frames of a depth camera that replace each other, by pixels and as points without order, and a
-/// ball that is asked about in each.
-fn depth_frames(options: &Options) -> Result<(), Failure> {
-    const FRAMES: u32 = 20;
-    let [width, height] = [640, 480];
-    let rng = &mut rng(options.seed);
-    let first: Vec<[f64; 3]> =
-        depth_frame([width, height], 0.0, rng).into_iter().filter(|p| p[2].is_finite()).collect();
-    let built = BuildOptions::default();
-    let mut organised = MovingScan::new(&first, &built)?;
-    let (mut unorganised, mut anew) = (organised.clone(), organised.clone());
-    let tool: Vec<[f64; 3]> =
-        nearmiss_benches::object::bumpy_sphere(5000).into_iter().map(|p| p.map(|x| 0.15 * x)).collect();
-    let tool = MovingScan::new(&tool, &built)?;
-    let mut times: [Times; 6] = std::array::from_fn(|_| Times::default());
-    let [by_pixels, by_points, rebuild, ask_pixels, ask_points, ask_anew] = &mut times;
-    let (mut scratch, mut totals) = (Scratch::default(), Totals::default());
-    let asked = CollideOptions::default().with_evidence(Evidence::Certified);
-    let mut frames = Frames::new();
-    for step in 0..FRAMES {
-        let frame = depth_frame([width, height], 0.1 * f64::from(step), rng);
-        frames.push(frame.clone());
-        by_pixels.of(|| organised.replace_organised(&frame, width as usize))?;
-        by_points.of(|| unorganised.replace(&frame))?;
-        let measured: Vec<[f64; 3]> = frame.iter().copied().filter(|p| p[2].is_finite()).collect();
-        rebuild.of(|| anew = MovingScan::new(&measured, &built).unwrap_or_else(|_| anew.clone()));
-        for _ in 0..options.poses {
-            let seen = frame[rng.random_range(0..frame.len())];
-            if !seen[2].is_finite() {
-                continue;
-            }
-            let away = unit_vector(rng).map(|c| c * (0.12 + 0.1 * rng.random::<f64>()));
-            let pose = rotation(rng).with_translation([0, 1, 2].map(|k| seen[k] + away[k]));
-            let mut ask = |scan: &MovingScan, times: &mut Times| -> Result<Answer, Failure> {
-                let plan = CollidePlan::new(&asked, scan, &tool)?;
-                let pair = Pair::new(scan.at(&Pose::IDENTITY), tool.at(&pose));
-                Ok(times.of(|| black_box(pair.collide(&plan, &mut scratch))))
-            };
-            let expected = ask(&anew, ask_anew)?;
-            let found = [ask(&organised, ask_pixels)?, ask(&unorganised, ask_points)?];
-            let scans: [&MovingScan; 2] = [&organised, &unorganised];
-            for (k, (found, scan)) in found.iter().zip(scans).enumerate() {
-                totals.proven[k] += usize::from(is_proof(&found.verdict));
-                if found.verdict.is_intersecting() != expected.verdict.is_intersecting() {
-                    totals.differ[k] += 1;
-                    let (apart, answer) =
-                        if expected.verdict.is_intersecting() { (scan, found) } else { (&anew, &expected) };
-                    let plan = DistancePlan::new(&DistanceOptions::default(), apart, &tool)?;
-                    let pair = Pair::new(apart.at(&Pose::IDENTITY), tool.at(&pose));
-                    let distance = pair.distance(&plan, &mut Scratch::default()).upper;
-                    totals.beyond[k] += usize::from(distance > answer.band);
-                }
-            }
-            totals.proven[2] += usize::from(is_proof(&expected.verdict));
-            totals.apart += usize::from(expected.verdict.is_separated());
-        }
-    }
-    heading(&format!("frames of a depth camera: {width} × {height}, {} points", organised.len()));
-    let names = [
-        "replaced by pixels",
-        "replaced by points",
-        "prepare anew",
-        "ask, by pixels",
-        "ask, by points",
-        "ask, prepared anew",
-    ];
-    let count = times[3].0.len();
-    times.into_iter().zip(names).for_each(|(times, name)| times.row(name));
-    for (name, by_pixels) in [("replaced by pixels, alone", true), ("replaced by points, alone", false)] {
-        let scan = RefCell::new(MovingScan::new(&first, &built)?);
-        let follow = |frame: &Vec<[f64; 3]>| {
-            let mut scan = scan.borrow_mut();
-            if by_pixels {
-                scan.replace_organised(frame, width as usize)?
-            } else {
-                scan.replace(frame)?
-            }
-            Ok(())
-        };
-        let ask = |frame: &Vec<[f64; 3]>| {
-            let scan = scan.borrow();
-            let plan = CollidePlan::new(&asked, &scan, &tool)?;
-            let step = frame.len() / options.poses.max(1) as usize;
-            for seen in frame.iter().step_by(step.max(1)).filter(|seen| seen[2].is_finite()) {
-                let tool = tool.at(&Pose::from_translation([seen[0], seen[1], seen[2] - 0.2]));
-                black_box(Pair::new(scan.at(&Pose::IDENTITY), tool).collide(&plan, &mut scratch));
-            }
-            Ok(())
-        };
-        alone(name, frames.iter(), follow, ask)?;
-    }
-    let Totals { differ, beyond, proven, apart, .. } = totals;
-    println!(
-        "\n{differ:?} of {count} verdicts by pixels and by points differ from those prepared anew, {beyond:?} beyond the \
-         band; of {apart} separations {proven:?} are certified by each"
-    );
-    Ok(())
-}
-
-/// Counts over all frames and poses, of refitted, renewed and rebuilt scans.
-#[derive(Debug, Default)]
-struct Totals {
-    /// Verdicts that differ from those of a scan prepared anew, and those beyond the band.
-    differ: [usize; 2],
-    beyond: [usize; 2],
-    /// Certified separations.
-    proven: [usize; 3],
-    apart: usize,
-    /// Points fitted anew by refits, in all frames and at most.
-    fitted: usize,
-    most: usize,
-    loosest: f64,
-}
-
-fn is_proof(verdict: &Verdict) -> bool {
-    matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
 }
 
 /// Returns the upper bound of the distance of two copies.

@@ -1,0 +1,68 @@
+//! Times and counts of methods that follow frames.
+
+use nearmiss::{Evidence, Verdict};
+use nearmiss_benches::Failure;
+use nearmiss_benches::clock::{nanoseconds, timed};
+use nearmiss_benches::sample::count;
+
+/// Positions of all frames.
+pub(crate) type Frames = Vec<Vec<[f64; 3]>>;
+
+/// Times in microseconds.
+#[derive(Debug, Default)]
+pub(crate) struct Times(pub(crate) Vec<f64>);
+
+impl Times {
+    pub(crate) fn of<R>(&mut self, work: impl FnOnce() -> R) -> R {
+        let (result, time) = timed(work);
+        self.0.push(nanoseconds(time) / 1e3);
+        result
+    }
+
+    pub(crate) fn row(mut self, name: &str) {
+        self.0.sort_by(f64::total_cmp);
+        let (n, total) = (self.0.len(), self.0.iter().sum::<f64>());
+        if n > 0 {
+            println!("| {name} | {:.1} | {:.1} | {:.1} |", total / count(n), self.0[n / 2], self.0[n - 1]);
+        }
+    }
+}
+
+/// Follows frames by one method alone, with questions about each frame.
+pub(crate) fn alone<'f, F: 'f + ?Sized>(
+    name: &str,
+    frames: impl Iterator<Item = &'f F>,
+    mut follow: impl FnMut(&'f F) -> Result<(), Failure>,
+    mut ask: impl FnMut(&'f F) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut times = Times::default();
+    for frame in frames {
+        times.of(|| follow(frame))?;
+        ask(frame)?;
+    }
+    times.row(name);
+    Ok(())
+}
+
+pub(crate) fn heading(what: &str) {
+    println!("\n## {what}\n\n| µs | mean | median | most |\n| --- | --: | --: | --: |");
+}
+
+/// Counts over all frames and poses, of refitted, renewed and rebuilt scans.
+#[derive(Debug, Default)]
+pub(crate) struct Totals {
+    /// Verdicts that differ from those of a scan prepared anew, and those beyond the band.
+    pub(crate) differ: [usize; 2],
+    pub(crate) beyond: [usize; 2],
+    /// Certified separations.
+    pub(crate) proven: [usize; 3],
+    pub(crate) apart: usize,
+    /// Points fitted anew by refits, in all frames and at most.
+    pub(crate) fitted: usize,
+    pub(crate) most: usize,
+    pub(crate) loosest: f64,
+}
+
+pub(crate) fn is_proof(verdict: &Verdict) -> bool {
+    matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
+}
