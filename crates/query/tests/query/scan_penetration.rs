@@ -68,9 +68,9 @@ fn scans_of_known_penetration() {
             [patch(4.0, 4.0), sphere(1.0), sphere(0.6), torus(1.0, 0.3), cuboid([1.0, 0.8, 0.6])]
                 .map(|form| prepare(form, noise));
         let mut worst = (0.0_f64, f64::INFINITY);
-        for round in 0..4 {
+        for round in 0..4_u8 {
             let up = |z: f64| Pose::from_translation([0.1 * f64::from(round), 0.05, z]);
-            let depth = [0.03, 0.1, 0.2, 0.27][round as usize] + rng.random_range(0.0..0.02);
+            let depth = [0.03, 0.1, 0.2, 0.27][usize::from(round)] + rng.random_range(0.0..0.02);
             let way = Vector::from(unit_vector(rng));
             let beside = |distance: f64| Pose::from_translation((way * distance).into());
             let cases = [
@@ -93,12 +93,6 @@ fn scans_of_known_penetration() {
                 check(case.name, &found, case.exact * scale, radius * scale);
                 worst.0 = worst.0.max((found.upper / scale - exact).abs() / radius);
                 worst.1 = worst.1.min(found.lower / found.upper);
-                println!(
-                    "{name} {exact:.3}: {:.3} {:.3} {:?}",
-                    found.lower / scale,
-                    found.upper / scale,
-                    found.statistics
-                );
                 assert!(shorter_shifts_do_not_part(&case, &poses, &found, rng) > 0, "{name}");
             }
         }
@@ -243,10 +237,6 @@ fn shapes_in_a_floor() {
                 assert!((found.upper - exact).abs() <= 1.5 * radius, "{name}, {round}: {exact} {found:?}");
                 worst.0 = worst.0.max((found.upper - exact).abs() / radius);
                 worst.1 = worst.1.min(found.lower / exact);
-                println!(
-                    "{name} {exact:.3}: {:.3} {:.3} {}",
-                    found.lower, found.upper, found.statistics.evaluations
-                );
                 for _ in 0..10 {
                     let t = Vector::from(unit_vector(rng)) * (found.lower * rng.random_range(0.0..0.999));
                     let moved = Placed::new(&floor, &shifted(&Pose::IDENTITY, -t));
