@@ -112,7 +112,7 @@ impl Question {
         let sentence = views.sentence(&asked.answer, options, distance);
         if let Some(line) = asked.line {
             let apart = asked.penetration.as_ref();
-            let apart = apart.and_then(|found| penetration_sentence(found, "b", views.unit()));
+            let apart = apart.and_then(|found| asked.way_out(found, views.unit()));
             let apart = apart.map_or_else(String::new, |apart| format!(" {apart}"));
             return results.line(format_args!("line {line}: {sentence}{apart}"));
         }
@@ -121,7 +121,7 @@ impl Question {
             results.line(hint)?;
         }
         let unit = views.unit();
-        let apart = asked.penetration.as_ref().and_then(|found| penetration_sentence(found, "b", unit));
+        let apart = asked.penetration.as_ref().and_then(|found| asked.way_out(found, unit));
         if let Some(apart) = apart {
             results.line(apart)?;
         }
@@ -157,6 +157,17 @@ struct Asked {
 impl Asked {
     fn is_hit(&self) -> bool {
         self.answer.verdict.is_intersecting()
+    }
+
+    /// Returns the penetration as a sentence.
+    fn way_out(&self, found: &Penetration, unit: f64) -> Option<String> {
+        let sentence = penetration_sentence(found, ["b", "them"], unit)?;
+        let is_nested = self.answer.verdict.is_separated();
+        Some(if is_nested {
+            format!("One is inside the other, which is solid. {sentence}")
+        } else {
+            sentence
+        })
     }
 
     /// Returns the entry of this answer in the log of a path.

@@ -87,7 +87,7 @@ pub struct CollideArgs {
     pub penetration: bool,
     /// Scans whose closed surface encloses a solid, for --penetration
     ///
-    /// What is inside a solid overlaps it. Other scans are surfaces without inside, such as rooms. Without a
+    /// Not for meshes: their closed parts are solid. What is inside a solid overlaps it. Other scans are surfaces without inside, such as rooms. Without a
     /// solid scan there is no lower bound, except with --thickened.
     #[arg(long, value_enum, value_name = "WHICH", requires = "penetration", conflicts_with = "thickened")]
     pub solid: Option<SolidName>,

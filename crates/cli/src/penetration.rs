@@ -56,27 +56,33 @@ fn overlaps(found: &Penetration) -> bool {
     found.upper > 0.0 && found.upper.is_finite()
 }
 
-/// Returns the penetration as a sentence about `moved`; `None` for things that are separate, and for invalid
+/// Returns the penetration as a sentence: `moved` is moved away `from` another thing; `None` for things that are separate, and for invalid
 /// poses. The lower bound is rounded down, the upper one up.
-pub(crate) fn penetration_sentence(found: &Penetration, moved: &str, unit: f64) -> Option<String> {
+pub(crate) fn penetration_sentence(
+    found: &Penetration,
+    [moved, from]: [&str; 2],
+    unit: f64,
+) -> Option<String> {
     if !overlaps(found) {
         return None;
     }
     let [x, y, z] = found.direction.map(|x| rounded(x, 1e-5));
     let upper = rounded(found.upper + 0.5 * unit, unit);
     let within = match found.evidence {
-        Evidence::Estimated => format!(" (estimated, within {})", short(found.band)),
+        Evidence::Estimated => {
+            format!(" (estimated; gaps below {} cannot be told from contact)", short(found.band))
+        }
         Evidence::Certified => String::new(),
     };
     let least = match (found.lower > 0.0, found.evidence) {
         (true, Evidence::Certified) => {
-            format!("no shift below {} does (certified)", rounded_down(found.lower, unit))
+            format!("no move below {} is enough (certified)", rounded_down(found.lower, unit))
         }
-        (true, Evidence::Estimated) => format!("no shift below {} does", rounded_down(found.lower, unit)),
-        (false, _) => "a shorter shift may do".to_owned(),
+        (true, Evidence::Estimated) => format!("no move below {} is enough", rounded_down(found.lower, unit)),
+        (false, _) => "a shorter move may be enough".to_owned(),
     };
     let unfinished = if found.complete { "" } else { " The budget ran out; raise --budget or --work." };
     Some(format!(
-        "Moving {moved} by {upper} along ({x}, {y}, {z}) separates them{within}; {least}.{unfinished}"
+        "Moving {moved} by {upper} along ({x}, {y}, {z}) separates {from}{within}; {least}.{unfinished}"
     ))
 }

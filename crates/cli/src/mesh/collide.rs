@@ -205,7 +205,8 @@ impl Question<'_> {
         let beside =
             is_apart.then(|| self.meshes.pair(&asked.poses, now()).distance(&mut MeshScratch::default()));
         let distance = beside.as_ref().or(asked.clearance.as_ref());
-        let apart = asked.penetration.as_ref().and_then(|found| penetration_sentence(found, "b", unit));
+        let apart =
+            asked.penetration.as_ref().and_then(|found| penetration_sentence(found, ["b", "them"], unit));
         let sentence = sentence(&asked.answer, distance, unit);
         let sentence = match apart {
             Some(apart) => format!("{sentence} {apart}"),

@@ -90,7 +90,8 @@ pub(super) fn of_surface(
         if is_json {
             results.json(&report)?;
         } else {
-            let way = penetration.and_then(|found| penetration_sentence(&found, "it", 0.01 * r));
+            let way = penetration
+                .and_then(|found| penetration_sentence(&found, ["it", "it from the scan"], 0.01 * r));
             let way = way.map_or_else(String::new, |way| format!(" {way}"));
             results.line(format_args!("line {line}: {}{way}", sentence(&report, asked.margin, 0.01 * r)))?;
         }
@@ -141,7 +142,7 @@ fn sentence(report: &SurfaceReport<'_>, margin: f64, unit: f64) -> String {
                 let [u, v, w] = contact.normal;
                 let what = if contact.depth >= 0.0 { "deep" } else { "away" };
                 let (at, depth) = (place(contact.point, unit), rough(contact.depth.abs()));
-                format!(" {depth} {what} at {at}; the way out is ({u:.4}, {v:.4}, {w:.4}).")
+                format!(" {depth} {what} at {at}; the normal there is ({u:.4}, {v:.4}, {w:.4}).")
             });
             format!("The shape {within} ({evidence}).{deepest}")
         }

@@ -471,9 +471,9 @@ fn a_penetration_tells_how_to_get_scans_apart() {
     assert!(lower > 0.2 && lower < 0.33 && (upper - 0.3).abs() < 0.05, "{answer}");
     assert!(numbers(&found["direction"])[2] > 0.98, "{answer}");
     let words = place.ok(&[&asked[..], &["--solid", "b"]].concat()).results;
-    assert!(words.contains("Moving b by 0.3") && words.contains("no shift below 0.2"), "{words}");
+    assert!(words.contains("Moving b by 0.3") && words.contains("no move below 0.2"), "{words}");
     let hollow = place.ok(&asked).results;
-    assert!(hollow.contains("a shorter shift may do"), "{hollow}");
+    assert!(hollow.contains("a shorter move may be enough"), "{hollow}");
     let short = place.ok(&[&asked[..], &["--work", "100", "--json"]].concat()).json().remove(0);
     assert!(short["penetration"]["complete"] == false, "{short}");
     place.write("poses.txt", "0 0 0.7 0 0 0 1\n0 0 3 0 0 0 1\n");

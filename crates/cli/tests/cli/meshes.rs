@@ -361,10 +361,7 @@ fn a_penetration_tells_how_to_get_meshes_apart() {
     let asked = ["mesh-collide", "cube.nm", "cube.nm", "--penetration", "--pose-b", &shift(1.5, 0.3, 0.2)];
     let words = place.ok(&asked).results;
     assert!(words.contains("Moving b by 0.500"), "{words}");
-    assert!(
-        words.contains(" along (1.00000, 0.00000, 0.00000) separates them; no shift below 0."),
-        "{words}"
-    );
+    assert!(words.contains(" along (1.00000, 0.00000, 0.00000) separates them; no move below 0."), "{words}");
     place.write("poses.txt", "1.5 0 0 0 0 0 1\n5 0 0 0 0 0 1\n");
     let many =
         place.ok(&["mesh-collide", "cube.nm", "cube.nm", "--penetration", "--poses", "poses.txt"]).results;

@@ -150,12 +150,14 @@ impl Build<'_> {
                 let row = cubes.number([x, y, zs.start]) - first;
                 let start = cubes.centre(row + first);
                 let mut away = [0, 1, 2].map(|k| (start[k] - centre[k]) as f32);
+                let mut height = start[2] - centre[2];
                 for cell in &mut cells[row..row + zs.len()] {
+                    away[2] = height as f32;
                     let own = Nearest::new(&bounds, away, leaf);
                     if own.is_nearer_than(cell) {
                         *cell = own;
                     }
-                    away[2] += cubes.edge() as f32;
+                    height += cubes.edge();
                 }
             }
         }

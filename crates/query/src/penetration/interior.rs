@@ -9,7 +9,7 @@ use crate::penetration::probe::Vector;
 use crate::solid::cast::{Crossing, all_hits};
 use crate::solid::core::Solid;
 use crate::solid::distance::distance;
-use crate::solid::elements::Elements;
+use crate::solid::elements::{Element, Elements};
 use crate::solid::ray::StoredRay;
 
 /// Directions of the rays, of about unit length. They are irrational and far from those of edges and walls.
@@ -23,8 +23,9 @@ const RAYS: [[f64; 3]; 7] = [
     [0.3090170, 0.4472136, -0.8393972],
 ];
 
-/// Rays that decide if they agree.
+/// Rays that decide if they agree, and the least number of all rays that makes sure.
 const FEW: usize = 3;
+const SURE: usize = 6;
 
 /// Working memory.
 pub(crate) type Working<'w> = (Level, &'w mut Vec<Crossing>, &'w mut ViewScratch);
@@ -34,6 +35,23 @@ pub(crate) type Working<'w> = (Level, &'w mut Vec<Crossing>, &'w mut ViewScratch
 /// A ray from a place inside a closed surface crosses it an odd number of times. Three rays decide if they
 /// agree, otherwise the majority of seven: a ray may leave by a hole, or graze the surface.
 pub(crate) fn is_inside(elements: &Elements<'_>, place: &Vector, working: Working<'_>) -> bool {
+    let (odd, cast) = odd_rays(elements, place, FEW, working);
+    2 * odd > cast
+}
+
+/// Returns `true` if at least six of seven rays tell that a place is inside.
+fn is_surely_inside(elements: &Elements<'_>, place: &Vector, working: Working<'_>) -> bool {
+    odd_rays(elements, place, RAYS.len(), working).0 >= SURE
+}
+
+/// Counts the rays from a place that cross the surface an odd number of times, and all that were cast: no more
+/// than `few` if these agree.
+fn odd_rays(
+    elements: &Elements<'_>,
+    place: &Vector,
+    few: usize,
+    (level, found, scratch): Working<'_>,
+) -> (usize, usize) {
     let bounds = elements.placed.scan().root_box();
     let away = place - Vector::from(bounds.centre.map(f64::from));
     let is_beyond = |k: usize| {
@@ -42,9 +60,8 @@ pub(crate) fn is_inside(elements: &Elements<'_>, place: &Vector, working: Workin
     };
     // Also true of NaN.
     if (0..3).any(is_beyond) || !place.iter().all(|x| x.is_finite()) {
-        return false;
+        return (0, few);
     }
-    let (level, found, scratch) = working;
     let mut odd = 0;
     for (n, direction) in RAYS.iter().enumerate() {
         let direction = Vector::from(*direction).normalize();
@@ -52,11 +69,11 @@ pub(crate) fn is_inside(elements: &Elements<'_>, place: &Vector, working: Workin
         let mut crossings = 0_u32;
         all_hits(elements, &ray, (level, &mut *found, &mut *scratch), |_| crossings += 1);
         odd += usize::from(crossings % 2 == 1);
-        if n + 1 == FEW && (odd == 0 || odd == FEW) {
-            break;
+        if n + 1 == few && (odd == 0 || odd == few) {
+            return (odd, few);
         }
     }
-    odd == FEW || 2 * odd > RAYS.len()
+    (odd, RAYS.len())
 }
 
 /// Returns `true` if the inside counts.
@@ -65,13 +82,13 @@ pub(crate) fn counts(elements: &Elements<'_>, interior: Interior) -> bool {
 }
 
 /// The distance of a place inside a solid scan from its surface, in the stored frame, and the direction away
-/// from there. `None` if the place is outside.
+/// from there. `None` unless the place is surely inside.
 pub(crate) fn depth_in(
     elements: &Elements<'_>,
     place: &Vector,
     (level, found, scratch): Working<'_>,
 ) -> Option<(f64, Vector)> {
-    if !is_inside(elements, place, (level, found, scratch)) {
+    if !is_surely_inside(elements, place, (level, found, scratch)) {
         return None;
     }
     let found = distance(elements, Some(&Solid::point(*place)), f64::INFINITY, level)?;
@@ -81,8 +98,14 @@ pub(crate) fn depth_in(
     Some((found.lower / elements.scale(), uphill))
 }
 
-/// The measured point nearest to a place, in the stored frame. `None` if points do not count.
-pub(crate) fn nearest_point(elements: &Elements<'_>, place: &Vector) -> Option<Vector> {
-    let counts = elements.semantics != Semantics::Surface;
-    counts.then(|| elements.position(elements.placed.scan().nearest_point((*place).into()) as usize))
+/// The measured point nearest to a place, in the stored frame, and the radius about it that is part of the
+/// obstacle. `None` if points are no part of the obstacle.
+pub(crate) fn nearest_point(elements: &Elements<'_>, place: &Vector) -> Option<(Vector, f64)> {
+    if elements.semantics == Semantics::Surface {
+        return None;
+    }
+    match elements.element(elements.placed.scan().nearest_point((*place).into()) as usize) {
+        Element::Disc(disc) => Some((disc.centre, 0.0)),
+        Element::Ball(centre, radius) => Some((centre, radius)),
+    }
 }

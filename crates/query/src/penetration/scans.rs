@@ -167,6 +167,28 @@ impl ScanProbe<'_> {
         if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
+    /// Measures how deep a place is in both scans, of which some are solid. The place is moved to the nearest
+    /// measured point of one that is not.
+    fn deep_in(&mut self, place: Vector, solid: [bool; 2]) -> Option<Deep> {
+        let mut found = Deep { place, depth: self.plan.options().margin, uphill: Vector::zeros() };
+        for k in (0..2).filter(|&k| !solid[k]) {
+            let placed = self.scans[k].stored_to_world();
+            let (point, radius) =
+                nearest_point(&self.elements[k], &placed.apply_inverse(place.into()).into())?;
+            found.place = placed.apply(point.into()).into();
+            found.depth += radius * placed.scale();
+        }
+        for k in (0..2).filter(|&k| solid[k]) {
+            let placed = *self.scans[k].stored_to_world();
+            let stored = Vector::from(placed.apply_inverse(found.place.into()));
+            let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
+            let (depth, uphill) = depth_in(&self.elements[k], &stored, working)?;
+            found.depth += depth * placed.scale();
+            found.uphill += Vector::from(placed.rotate(uphill.into()));
+        }
+        Some(found)
+    }
+
     /// The greatest shift under which two balls of thickened points stay in contact, from the residual of
     /// their contact; 0 for surfaces.
     fn depth_of(&self, residual: f64) -> f64 {
@@ -204,43 +226,26 @@ impl Probe for ScanProbe<'_> {
             let normals = contact.normals.unwrap_or([[0.0; 3]; 2]).map(Vector::from);
             survey.add(contact.point.into(), normals, self.depth_of(contact.residual));
         }
-        let complete = contacts.complete;
+        let is_cut_short = !contacts.complete && self.budget.may_end();
         *self.contacts = contacts;
         flow?;
-        if complete { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if is_cut_short { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// The place is moved to the nearest measured point of a scan without inside.
     fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
         if self.solid == [false; 2] {
             return ControlFlow::Continue(None);
         }
         self.go_on()?;
         self.spent.evaluations += 1;
-        let mut found = Deep { place, depth: self.plan.options().margin, uphill: Vector::zeros() };
-        for k in 0..2 {
-            if !self.solid[k] {
-                let placed = self.scans[k].stored_to_world();
-                let stored = placed.apply_inverse(place.into()).into();
-                let Some(point) = nearest_point(&self.elements[k], &stored) else {
-                    return ControlFlow::Continue(None);
-                };
-                found.place = placed.apply(point.into()).into();
-            }
-        }
-        for k in 0..2 {
-            if self.solid[k] {
-                let placed = self.scans[k].stored_to_world();
-                let stored = Vector::from(placed.apply_inverse(found.place.into()));
-                let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
-                let Some((depth, uphill)) = depth_in(&self.elements[k], &stored, working) else {
-                    return ControlFlow::Continue(None);
-                };
-                found.depth += depth * placed.scale();
-                found.uphill += Vector::from(placed.rotate(uphill.into()));
-            }
-        }
-        ControlFlow::Continue(Some(found))
+        let found = self.deep_in(place, self.solid);
+        // A thin solid is not thick enough to be hit; its points count as those of a surface.
+        let of_one = |probe: &mut Self, own: [bool; 2]| {
+            let both = probe.solid == [true; 2];
+            if both { probe.deep_in(place, own) } else { None }
+        };
+        let found = found.or_else(|| of_one(self, [true, false])).or_else(|| of_one(self, [false, true]));
+        ControlFlow::Continue(found)
     }
 
     fn centres(&self) -> [Vector; 2] {

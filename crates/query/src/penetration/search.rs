@@ -27,7 +27,11 @@ pub(crate) fn search<P: Probe>(probe: &mut P, out: Vector, contacts: &mut Contac
         ControlFlow::Continue(false) => search.narrow(),
         ControlFlow::Break(()) => ControlFlow::Break(()),
     };
-    let Search { best, lower, .. } = search;
+    let Search { best, mut lower, contacts, .. } = search;
+    // A deep place contradicts the shift: it is outside one of the things.
+    if lower > best.length * (1.0 + FINE) {
+        lower = contacts.least;
+    }
     Bounds { lower: lower.min(best.length), shift: best.vector(), complete: flow.is_continue() }
 }
 
@@ -105,7 +109,25 @@ impl<P: Probe> Search<'_, P> {
         }
         self.bisect(FINE)?;
         self.settle()?;
+        self.lengthen()?;
         self.raise()
+    }
+
+    /// Lengthens the shift a little if a longer one, by rounding, does not separate the things.
+    fn lengthen(&mut self) -> ControlFlow<()> {
+        let start = self.best.length;
+        let (mut length, mut was_apart, mut more) = (start, true, FINE);
+        for _ in 0..ROUNDS {
+            let longer = start * (1.0 + more);
+            let is_apart = self.probe.is_apart(self.best.way * longer)?;
+            if is_apart && was_apart {
+                self.best.length = length;
+                break;
+            }
+            (length, was_apart) = (longer, is_apart);
+            more *= 2.0;
+        }
+        ControlFlow::Continue(())
     }
 
     /// Projects the best shift onto the directions that separate the last contacts, for gains that the

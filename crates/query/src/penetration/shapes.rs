@@ -129,23 +129,34 @@ impl Probe for ShapeProbe<'_, '_> {
         ControlFlow::Continue(())
     }
 
-    /// The place is moved to the nearest measured point of a scan without inside.
+    /// The place is moved to the nearest measured point of a scan without inside, and to the core of a shape
+    /// that is beside it.
     fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
         self.go_on()?;
         self.spent.evaluations += 1;
-        let place = if self.is_solid { Some(place) } else { nearest_point(self.elements, &place) };
-        let Some(place) = place else { return ControlFlow::Continue(None) };
-        let Some((own, uphill)) = self.solid.depth(&place) else { return ControlFlow::Continue(None) };
-        let mut found = Deep { place, depth: self.elements.margin + own, uphill };
-        if self.is_solid {
-            let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
-            let Some((depth, uphill)) = depth_in(self.elements, &place, working) else {
-                return ControlFlow::Continue(None);
+        let (elements, solid) = (self.elements, self.solid);
+        let found = if self.is_solid {
+            let (place, (own, uphill)) = match solid.depth(&place) {
+                Some(own) => (place, own),
+                None => (solid.nearest(&place), (solid.radius, Vector::zeros())),
             };
-            found.depth += depth;
-            found.uphill += uphill;
-        }
-        ControlFlow::Continue(Some(found))
+            let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
+            depth_in(elements, &place, working).map(|(depth, away)| Deep {
+                place,
+                depth: elements.margin + own + depth,
+                uphill: uphill + away,
+            })
+        } else {
+            nearest_point(elements, &place).and_then(|(point, radius)| {
+                let (own, uphill) = solid.depth(&point).unwrap_or_else(|| {
+                    let way = solid.nearest(&point) - point;
+                    (solid.radius - way.norm(), way.try_normalize(0.0).unwrap_or_else(Vector::zeros))
+                });
+                let depth = elements.margin + radius + own;
+                (depth > 0.0).then_some(Deep { place: point, depth, uphill })
+            })
+        };
+        ControlFlow::Continue(found)
     }
 
     fn centres(&self) -> [Vector; 2] {

@@ -282,3 +282,44 @@ fn shapes_in_a_solid() {
     assert_eq!(ask(1.4, SOLID).upper, 0.0);
     assert_eq!(ask(f64::NAN, SOLID).upper, f64::INFINITY);
 }
+
+/// Things without thickness inside a solid, and points that are balls.
+#[test]
+fn thin_and_thick_things() {
+    let (ball, dot) = (prepare(sphere(1.0), 0.0), prepare(sphere(0.05), 0.0));
+    let scratch = &mut Scratch::default();
+    let pose = Pose::from_translation([0.1, 0.0, 0.0]).with_scale(0.01);
+    let plan = CollidePlan::new(&CollideOptions::default(), &ball, &dot).unwrap();
+    let pair = Pair::new(Placed::new(&ball, &Pose::IDENTITY), Placed::new(&dot, &pose));
+    for interiors in [[SOLID, HOLLOW], [SOLID; 2]] {
+        let found = pair.penetration(&plan, interiors, scratch);
+        assert!(found.lower > 0.85 && found.lower <= found.upper && found.upper < 0.92, "{found:?}");
+    }
+    let plan = ShapePlan::new(&CollideOptions::default(), &ball).unwrap();
+    let target = Target::new(Placed::new(&ball, &Pose::IDENTITY), &plan);
+    let corners = [[0.1, 0.0, 0.0], [0.1, 0.2, 0.0], [0.1, 0.0, 0.2]];
+    let thin = [
+        Shape::Sphere { centre: [0.1, 0.0, 0.0], radius: 0.0 },
+        Shape::Triangle { points: corners, radius: 0.0 },
+        Shape::Hull { points: &corners, radius: 0.0 },
+        Shape::Box { pose: Pose::from_translation([0.1, 0.0, 0.0]), half: [0.0, 0.1, 0.1], radius: 0.0 },
+    ];
+    for shape in thin {
+        let found = target.penetration(&shape, SOLID, &Budget::UNLIMITED, scratch);
+        assert!(
+            found.lower > 0.75 && found.upper >= found.lower && found.upper < 1.1,
+            "{shape:?}: {found:?}"
+        );
+    }
+    let thick = CollideOptions::default().with_semantics(Semantics::Thickened(0.1));
+    let plan = ShapePlan::new(&thick, &ball).unwrap();
+    let target = Target::new(Placed::new(&ball, &Pose::IDENTITY), &plan);
+    for (centre, radius, exact) in
+        [([0.0; 3], 5.0, 6.1), ([1.0, 0.0, 0.0], 1e-9, 0.1), ([1.25, 0.0, 0.0], 0.2, 0.05)]
+    {
+        let shape = Shape::Sphere { centre, radius };
+        let found = target.penetration(&shape, HOLLOW, &Budget::UNLIMITED, scratch);
+        assert!(found.lower > 0.6 * exact && found.lower <= exact + 1e-9, "{shape:?}: {found:?}");
+        assert!((found.upper - exact).abs() < 0.03, "{shape:?}: {found:?}");
+    }
+}
