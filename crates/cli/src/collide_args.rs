@@ -87,8 +87,9 @@ pub struct CollideArgs {
     pub penetration: bool,
     /// Scans whose closed surface encloses a solid, for --penetration
     ///
-    /// Not for meshes: their closed parts are solid. What is inside a solid overlaps it. Other scans are surfaces without inside, such as rooms. Without a
-    /// solid scan there is no lower bound, except with --thickened.
+    /// Not for meshes: their closed parts are solid. What is inside a solid overlaps it. Other scans
+    /// are surfaces without inside, such as rooms. Without a solid scan there is no lower bound, except
+    /// with --thickened.
     #[arg(long, value_enum, value_name = "WHICH", requires = "penetration", conflicts_with = "thickened")]
     pub solid: Option<SolidName>,
     /// The search options

@@ -56,8 +56,8 @@ fn overlaps(found: &Penetration) -> bool {
     found.upper > 0.0 && found.upper.is_finite()
 }
 
-/// Returns the penetration as a sentence: `moved` is moved away `from` another thing; `None` for things that are separate, and for invalid
-/// poses. The lower bound is rounded down, the upper one up.
+/// Returns the penetration as a sentence: `moved` is moved away `from` another thing; `None` for things
+/// that are separate, and for invalid poses. The lower bound is rounded down, the upper one up.
 pub(crate) fn penetration_sentence(
     found: &Penetration,
     [moved, from]: [&str; 2],

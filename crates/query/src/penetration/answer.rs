@@ -21,8 +21,9 @@ pub enum Interior {
 /// least shift that separates them ≤ upper. Of two things b is shifted; of a shape and a scan, the shape.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penetration {
-    /// A lower bound: every shift that is shorter leaves a contact or an overlap. 0 if there is none. Rays judge
-    /// which places are inside a [solid](Interior::Solid) scan; the bound is proven as far as they are right.
+    /// A lower bound: every shift that is shorter leaves a contact or an overlap. 0 if there is none.
+    /// Rays judge which places are inside a [solid](Interior::Solid) scan; the bound is proven as far
+    /// as they are right.
     pub lower: f64,
     /// The length of a shift after which the two are separate: 0 if they already are, infinite if a pose or
     /// a shape is invalid, or if no such shift was found.

@@ -44,8 +44,8 @@ fn is_surely_inside(elements: &Elements<'_>, place: &Vector, working: Working<'_
     odd_rays(elements, place, RAYS.len(), working).0 >= SURE
 }
 
-/// Counts the rays from a place that cross the surface an odd number of times, and all that were cast: no more
-/// than `few` if these agree.
+/// Counts the rays from a place that cross the surface an odd number of times, and all that were cast:
+/// no more than `few` if these agree.
 fn odd_rays(
     elements: &Elements<'_>,
     place: &Vector,
