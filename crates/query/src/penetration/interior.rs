@@ -62,12 +62,17 @@ fn odd_rays(
     if (0..3).any(is_beyond) || !place.iter().all(|x| x.is_finite()) {
         return (0, few);
     }
+    // Balls of noisy points, and discs near them, are part of one surface.
+    let layer = f64::from(elements.arrays.sampling_radius) * elements.scale();
     let mut odd = 0;
     for (n, direction) in RAYS.iter().enumerate() {
         let direction = Vector::from(*direction).normalize();
         let ray = StoredRay { origin: *place, direction, max: f64::INFINITY, radius: 0.0 };
-        let mut crossings = 0_u32;
-        all_hits(elements, &ray, (level, &mut *found, &mut *scratch), |_| crossings += 1);
+        let (mut crossings, mut last) = (0_u32, f64::NEG_INFINITY);
+        all_hits(elements, &ray, (level, &mut *found, &mut *scratch), |hit| {
+            crossings += u32::from(hit.t - last > layer);
+            last = hit.t;
+        });
         odd += usize::from(crossings % 2 == 1);
         if n + 1 == few && (odd == 0 || odd == few) {
             return (odd, few);
