@@ -34,7 +34,8 @@ const ROUNDING: f64 = 8e-6;
 /// Parts of the grid that threads work on.
 const SHARE: usize = 16;
 
-/// No leaf is near: the root is none.
+/// The entry of a cell without a near leaf. The root of a tree with inner nodes is not a leaf, and in a
+/// tree of one leaf nothing is saved by naming it.
 const NONE: NodeId = NodeId::ROOT;
 
 /// A grid with the *clearance* of each cell, a lower bound of the distance of its centre from the obstacle,

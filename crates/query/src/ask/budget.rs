@@ -1,5 +1,6 @@
 //! Limits on the cost of a query. The only module of the libraries that reads a clock.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 /// A point in time at which to stop. Absolute, so that one deadline can span all queries of a
@@ -71,6 +72,13 @@ impl Budget {
     /// Returns `true` if work or time may end a query early.
     pub(crate) const fn may_end(&self) -> bool {
         self.work.is_some() || self.deadline.is_some()
+    }
+
+    /// Breaks if `spent` units of work, or the time, have reached a limit.
+    pub(crate) fn go_on(&self, spent: u64) -> ControlFlow<()> {
+        let is_over = self.work.is_some_and(|work| spent >= work)
+            || self.deadline.is_some_and(|deadline| now() >= deadline.0);
+        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// The same budget with the resolution `length`.

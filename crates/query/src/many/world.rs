@@ -105,7 +105,7 @@ pub enum Bodies<'a> {
 ///     BodyPair::Scans(pair) => pair.collide(&plan, &mut scratch).verdict.is_intersecting(),
 ///     BodyPair::MeshAndScan { pair, .. } => pair.collide(&of_mesh, &mut scratch).verdict.is_intersecting(),
 ///     BodyPair::Meshes(pair) => pair.collide(scratch.meshes()).verdict.is_intersecting(),
-///     _ => false, // A shape: there is none.
+///     _ => false, // This world has no shapes.
 /// });
 /// assert_eq!(meets.filter(|&meets| meets).count(), 2, "the lower tip meets the floor and the upper tip");
 /// # Ok::<(), Box<dyn std::error::Error>>(())

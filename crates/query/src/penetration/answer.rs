@@ -21,7 +21,7 @@ pub enum Interior {
 /// least shift that separates them ≤ upper. Of two things b is shifted; of a shape and a scan, the shape.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penetration {
-    /// A lower bound: every shift that is shorter leaves a contact or an overlap. 0 if there is none.
+    /// A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found.
     /// Rays judge which places are inside a [solid](Interior::Solid) scan; the bound is proven as far
     /// as they are right.
     pub lower: f64,

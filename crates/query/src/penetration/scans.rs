@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use nearmiss_geometry::NodeId;
 
 use crate::ask::answer::{Answer, Contacts, Evidence, Reason, Statistics, Verdict};
-use crate::ask::budget::{Budget, now};
+use crate::ask::budget::Budget;
 use crate::ask::options::{CollidePlan, Semantics};
 use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
 use crate::pair::placed::Placed;
@@ -123,7 +123,8 @@ impl ScanProbe<'_> {
         (placed.apply(root.centre.map(f64::from)).into(), radius * placed.scale())
     }
 
-    /// A shift along the line of the centres after which the scans are apart; `None` if there is none.
+    /// Finds a shift along the line of the centres after which the scans are apart. `None` if even far away
+    /// they are not found to be apart.
     fn out_of_balls(&mut self) -> Option<Vector> {
         let ((a, r), (b, s)) = (self.ball(0), self.ball(1));
         let between = b - a;
@@ -161,10 +162,7 @@ impl ScanProbe<'_> {
 
     /// Breaks if the budget is spent.
     fn go_on(&self) -> ControlFlow<()> {
-        let spent = self.spent.evaluations + self.spent.node_pairs;
-        let is_over = self.budget.work.is_some_and(|work| spent >= work)
-            || self.budget.deadline.is_some_and(|deadline| now() >= deadline.0);
-        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        self.budget.go_on(self.spent.evaluations + self.spent.node_pairs)
     }
 
     /// Measures how deep a place is in both scans, of which some are solid. The place is moved to the nearest

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use fearless_simd::Level;
 
 use crate::ask::answer::{Evidence, Statistics};
-use crate::ask::budget::{Budget, now};
+use crate::ask::budget::Budget;
 use crate::pair::placed::ViewScratch;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::interior::{counts, depth_in, is_inside, nearest_point};
@@ -65,8 +65,8 @@ impl ShapeProbe<'_, '_> {
         touch(self.elements, Some(&self.solid.shifted(&t)), (self.level, &mut *self.scratch))
     }
 
-    /// A shift away from the centre of the scan after which the shape touches nothing; `None` if there is
-    /// none.
+    /// Finds a shift away from the centre of the scan after which the shape touches nothing. `None` if even
+    /// far away it is not found to be separate.
     fn out_of_ball(&mut self) -> Option<Vector> {
         let bounds = self.elements.arrays.tree.root_box();
         let centre = Vector::from(bounds.centre.map(f64::from));
@@ -87,9 +87,7 @@ impl ShapeProbe<'_, '_> {
 
     /// Breaks if the budget is spent. A test of the shape counts as an evaluation.
     fn go_on(&self) -> ControlFlow<()> {
-        let is_over = self.budget.work.is_some_and(|work| self.spent.evaluations >= work)
-            || self.budget.deadline.is_some_and(|deadline| now() >= deadline.0);
-        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        self.budget.go_on(self.spent.evaluations)
     }
 }
 
