@@ -29,9 +29,9 @@ use std::convert::Infallible;
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16};
-use nearmiss_lanes::parallel::fill;
-use nearmiss_lanes::wide::{WIDTH, squared};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_lanes::parallel::change_each;
+use nearmiss_lanes::wide::{WIDTH, greatest, lanes_of, least, squared};
 use nearmiss_store::{Room, WorkError, Workspace};
 
 use crate::block::PointBlock;
@@ -57,6 +57,7 @@ impl Boxes {
     };
 
     /// Returns the boxes of a group. `count` is the number of boxes of the level.
+    #[inline(always)]
     fn of(group: usize, count: usize, bounds: impl Fn(usize) -> Bounds) -> Self {
         let mut boxes = Self::EMPTY;
         for (lane, i) in (group * WIDTH..count.min(group * WIDTH + WIDTH)).enumerate() {
@@ -104,27 +105,38 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// Returns the box of the first `count` points of a block.
-    fn of_block(block: &PointBlock, count: usize) -> Self {
-        let of = |k: usize| &block.position[k][..count];
-        Self::of(of, of, &block.support_radius[..count])
+    /// Returns the box of the first `count` points of a block; of all if there are fewer.
+    #[inline(always)]
+    fn of_block<S: Simd>(simd: S, block: &PointBlock, count: usize) -> Self {
+        let used = lanes_of(0, &(0..count));
+        Self::of(simd, used, (&block.position, &block.position), &block.support_radius)
     }
 
     /// Returns the box of all boxes of a group.
-    fn of_group(group: &Boxes) -> Self {
-        Self::of(|k| &group.min[k], |k| &group.max[k], &group.support_radius)
+    #[inline(always)]
+    fn of_group<S: Simd>(simd: S, group: &Boxes) -> Self {
+        Self::of(simd, lanes_of(0, &(0..WIDTH)), (&group.min, &group.max), &group.support_radius)
     }
 
-    fn of<'a>(
-        min: impl Fn(usize) -> &'a [f32],
-        max: impl Fn(usize) -> &'a [f32],
-        support_radii: &[f32],
+    /// Returns the box of the boxes in the lanes `used`.
+    #[inline(always)]
+    fn of<S: Simd>(
+        simd: S,
+        used: u32,
+        (min, max): (&[[f32; WIDTH]; 3], &[[f32; WIDTH]; 3]),
+        support_radii: &[f32; WIDTH],
     ) -> Self {
-        Self {
-            min: [0, 1, 2].map(|k| min(k).iter().copied().fold(f32::INFINITY, f32::min)),
-            max: [0, 1, 2].map(|k| max(k).iter().copied().fold(f32::NEG_INFINITY, f32::max)),
-            support_radius: support_radii.iter().copied().fold(0.0, f32::max),
+        let used = mask32x16::from_bitmask(simd, u64::from(used));
+        let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
+        let mut bounds = Self { min: [0.0; 3], max: [0.0; 3], support_radius: 0.0 };
+        for k in 0..3 {
+            let (min, max) = (f32x16::load_array_ref(simd, &min[k]), f32x16::load_array_ref(simd, &max[k]));
+            bounds.min[k] = least(simd.select_f32x16(used, min, most), f32::INFINITY);
+            bounds.max[k] = greatest(simd.select_f32x16(used, max, none), f32::NEG_INFINITY);
         }
+        let radii = f32x16::load_array_ref(simd, support_radii);
+        bounds.support_radius = greatest(simd.select_f32x16(used, radii, f32x16::splat(simd, 0.0)), 0.0);
+        bounds
     }
 
     /// Returns the squared distances of points from this box.
@@ -182,16 +194,24 @@ impl BlockBoxes {
     ) -> Result<Self, E> {
         assert_eq!(blocks.len(), points.div_ceil(WIDTH), "expected the blocks of {points} points");
         assert!(points < u32::MAX as usize, "expected fewer than 2^32 - 1 points, got {points}");
-        let mut level = room(blocks.len().div_ceil(WIDTH))?;
-        fill(&mut level, |group| {
-            let of = |block: usize| Bounds::of_block(&blocks[block], (points - block * WIDTH).min(WIDTH));
-            Boxes::of(group, blocks.len(), of)
+        let level = Level::new();
+        let mut first = room(blocks.len().div_ceil(WIDTH))?;
+        change_each(&mut first, WIDTH, |group, boxes| {
+            *boxes = dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || Boxes::of(group, blocks.len(), |i| Bounds::of_block(simd, &blocks[i], points - i * WIDTH)),
+            ));
         });
-        let mut levels = vec![level];
+        let mut levels = vec![first];
         while let Some(below) = levels.last().filter(|level| level.len() > 1) {
             let mut above = room(below.len().div_ceil(WIDTH))?;
             let below: &[Boxes] = below;
-            fill(&mut above, |group| Boxes::of(group, below.len(), |i| Bounds::of_group(&below[i])));
+            change_each(&mut above, WIDTH, |group, boxes| {
+                *boxes = dispatch!(level, simd => simd.vectorize(
+                    #[inline(always)]
+                    || Boxes::of(group, below.len(), |i| Bounds::of_group(simd, &below[i])),
+                ));
+            });
             levels.push(above);
         }
         Ok(Self { points, levels })

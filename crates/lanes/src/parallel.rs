@@ -221,7 +221,18 @@ pub fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R
         return Ok(pool.or(Err(NoThreads))?.install(work));
     }
     let _ = threads;
-    Ok(work())
+    Ok(in_pool(work))
+}
+
+/// Runs `work` on a thread of the current pool; without the feature `rayon`, on the calling thread.
+///
+/// A loop that starts outside the pool wakes the threads of the pool and waits for them, which takes tens
+/// of microseconds. Work with several loops waits once.
+pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    #[cfg(feature = "rayon")]
+    return rayon::scope(|_| work());
+    #[cfg(not(feature = "rayon"))]
+    work()
 }
 
 /// The error of [`on_threads`] if the threads cannot be started.

@@ -40,28 +40,34 @@ const AGREEING: f32 = 0.5;
 /// Corrects the classes of single points by those of their neighbours. O(n) if all points are on
 /// sheets.
 pub(crate) fn vote(tree: &BlockTree<'_>, positions: &[[f32; 3]], radii: &[f32], fits: &mut [Fit]) {
-    vote_among(tree, positions, radii, fits, |_| true);
+    let before = &*fits;
+    let blocks = tree.blocks().len();
+    for (i, fit) in votes(tree, positions, radii, |i| before[i], (blocks, |k| k)) {
+        fits[i as usize] = fit;
+    }
 }
 
-/// Does the same for the points that are `open`.
-pub(crate) fn vote_among(
+/// Returns the points of some blocks whose class their neighbours correct, with their fits after that.
+/// There are `count` blocks; `block` returns the number of each. `fit` returns the fit of any point
+/// before the votes.
+pub(crate) fn votes(
     tree: &BlockTree<'_>,
     positions: &[[f32; 3]],
     radii: &[f32],
-    fits: &mut [Fit],
-    open: impl Fn(usize) -> bool + Sync + Send,
-) {
-    let (level, before) = (Level::new(), &*fits);
+    fit: impl Fn(usize) -> Fit + Sync + Send,
+    (count, block): (usize, impl Fn(usize) -> usize + Sync + Send),
+) -> Vec<(u32, Fit)> {
+    let level = Level::new();
     let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(positions.len());
-    let in_doubt = |block: usize| of_block(block).any(|i| before[i].kind() == PointKind::Noisy && open(i));
+    let in_doubt = |block: &usize| of_block(*block).any(|i| fit(i).kind() == PointKind::Noisy);
     let mut changed = Vec::new();
-    let correct = |blocks: Range<usize>| {
+    let correct = |some: Range<usize>| {
         let (mut found, mut changed) = (Nearest::default(), Vec::new());
-        for block in blocks.filter(|&block| in_doubt(block)) {
+        for block in some.map(&block).filter(in_doubt) {
             tree.nearest(level, block, VOTERS, &mut found);
-            for i in of_block(block).filter(|&i| open(i)) {
+            for i in of_block(block) {
                 let near = found.of(i % WIDTH).take(VOTERS).map(|n| n.id as usize);
-                let known = (|i: usize| positions[i], |i: usize| radii[i], |i: usize| &before[i]);
+                let known = (|i: usize| positions[i], |i: usize| radii[i], &fit);
                 if let Some(fit) = corrected(i, near, &known) {
                     changed.push((id32(i), fit));
                 }
@@ -69,10 +75,8 @@ pub(crate) fn vote_among(
         }
         changed
     };
-    in_order(tree.blocks().len(), correct, |some| changed.extend(some));
-    for (i, fit) in changed {
-        fits[i as usize] = fit;
-    }
+    in_order(count, correct, |some| changed.extend(some));
+    changed
 }
 
 /// Returns `true` if neighbours with these normals may be on one sheet.
@@ -82,10 +86,10 @@ fn agree(n: [f32; 3], m: [f32; 3]) -> bool {
 
 /// Returns the fit of point `i` after the vote of its neighbours, the nearest first, if it changes.
 /// The functions return the position, the radius and the fit of a point.
-pub(crate) fn corrected<'a, I: Copy>(
+pub(crate) fn corrected<I: Copy>(
     i: I,
     near: impl Iterator<Item = I>,
-    (position, radius, fit): &(impl Fn(I) -> [f32; 3], impl Fn(I) -> f32, impl Fn(I) -> &'a Fit),
+    (position, radius, fit): &(impl Fn(I) -> [f32; 3], impl Fn(I) -> f32, impl Fn(I) -> Fit),
 ) -> Option<Fit> {
     let sheets = near.filter(|&j| fit(j).kind().is_sheet());
     match fit(i).kind() {
@@ -172,7 +176,7 @@ mod tests {
             fits
         };
         let corrected = |fits: &[Fit]| {
-            corrected(0, 1..9, &(|i: usize| positions[i], |i: usize| radii[i], |i: usize| &fits[i]))
+            corrected(0, 1..9, &(|i: usize| positions[i], |i: usize| radii[i], |i: usize| fits[i]))
         };
         assert!(
             corrected(&kinds(2)).is_none(),

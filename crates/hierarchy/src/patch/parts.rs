@@ -80,9 +80,9 @@ impl Parts<'_> {
     }
 }
 
-/// Replaces the box of each node by one along its axes about the discs and balls of the node's
-/// points, with their greatest radius, and sets its growths to the enclosures of the surface and of
-/// the obstacle. The surface is within `beyond` of the points. O(n).
+/// Replaces the box of each node with a leaf that is `changed` by one along its axes about the discs and
+/// balls of the node's points, with their greatest radius, and sets its growths to the enclosures of the
+/// surface and of the obstacle. The surface is within `beyond` of the points. O(n).
 ///
 /// The box of a node with at most four leaves is the smallest one. That of any other node is the
 /// smallest one about the boxes of the nodes with four leaves under it, which are small beside it.
@@ -91,11 +91,16 @@ pub(crate) fn bound_parts(
     (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]]),
     (points, parts): (&[PointBlock], &[PartBlock]),
     beyond: f32,
+    changed: impl Fn(usize) -> bool + Sync + Send,
 ) {
+    let is_changed = |id: usize| topology.leaves_under(NodeId(id32(id))).any(&changed);
     let (level, beyond, small) = (Level::new(), beyond * GROWN, topology.first_bottom());
     let (large_boxes, boxes) = boxes.split_at_mut(small);
     let (large_growths, growths) = growths.split_at_mut(small);
     change_both(boxes, growths, AT_ONCE, |number, bounds, growths| {
+        if !is_changed(small + number) {
+            return;
+        }
         let range = topology.points(NodeId(id32(small + number)));
         let Extents { discs, cells, points, reach } = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -108,6 +113,9 @@ pub(crate) fn bound_parts(
     });
     let (boxes, growths): (&[_], &[_]) = (boxes, growths);
     change_both(large_boxes, large_growths, 1, |id, bounds, of_node| {
+        if !is_changed(id) {
+            return;
+        }
         let below = topology.bottoms_under(NodeId(id32(id)));
         let below = below.start - small..below.end - small;
         (*bounds, *of_node) = dispatch!(level, simd => simd.vectorize(

@@ -61,7 +61,7 @@ pub(crate) fn vote(raster: &Raster, fits: &mut [Fit]) {
         let mut changed = Vec::new();
         for (here, there) in raster.row(row) {
             let pixels = || Bits(there).map(|lane| here.pixel(lane));
-            let fit = |pixel: Pixel| &before[raster.number(pixel)];
+            let fit = |pixel: Pixel| before[raster.number(pixel)];
             if pixels().any(|pixel| fit(pixel).kind() == PointKind::Noisy) {
                 let known = (|pixel| raster.position(pixel), |pixel| raster.radius(pixel), fit);
                 changed.extend(pixels().filter_map(|pixel| {

@@ -167,11 +167,11 @@ pub(crate) fn fits_of(
     some.into_iter().flatten().collect()
 }
 
-/// Returns the codes of the points of some leaves, in order. `fits` has those of all points.
+/// Returns the codes of the points of some leaves, in order. `fit` returns the fit of a point.
 pub(crate) fn codes_of(
     index: &Index<'_>,
     positions: &[[f32; 3]],
-    fits: &[Fit],
+    fit: impl Fn(usize) -> Fit + Sync + Send,
     leaves: &[u32],
 ) -> Vec<PointCode> {
     let level = Level::new();
@@ -182,7 +182,7 @@ pub(crate) fn codes_of(
             let own = positions[points.clone()].iter().map(|p| sub(*p, about.centre)).map(|d| dot(d, d));
             index.collect(level, about.centre, own.fold(0.0, f32::max).sqrt() * GROWN, &mut groups);
             for i in points {
-                let (p, fit) = (positions[i], &fits[i]);
+                let (p, fit) = (positions[i], fit(i));
                 let gap = dispatch!(level, simd => simd.vectorize(
                     #[inline(always)]
                     || {

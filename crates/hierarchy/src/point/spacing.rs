@@ -95,13 +95,7 @@ pub(crate) fn spacings(
         for block in blocks {
             search.start(block);
             let plain = search.plain(neighbours);
-            spacings.extend(of_block(block).map(|i| {
-                if plain >> (i % WIDTH) & 1 == 1 {
-                    search.area(i, neighbours)
-                } else {
-                    search.spacing(i, neighbours)
-                }
-            }));
+            spacings.extend(of_block(block).map(|i| search.spacing(i, neighbours, plain)));
         }
         spacings
     });
@@ -151,15 +145,15 @@ pub(crate) fn spacings_of(
         for block in blocks {
             let first = *block as usize * WIDTH;
             search.start(*block as usize);
+            let plain = search.plain(neighbours);
             for i in first..first + WIDTH {
                 if i >= points.len() {
                     found.push((Spacing::default(), 0.0));
                     continue;
                 }
-                let mut spacing = search.spacing(i, neighbours);
-                search.look(i, neighbours);
-                let smooth = |least: f32, n: &(f64, usize)| least.min(radii[n.1] + GROWTH * length(n));
-                let mut radius = search.near[1..].iter().fold(spacing.radius, smooth);
+                let mut spacing = search.spacing(i, neighbours, plain);
+                let smooth = |least: f32, n: (f64, usize)| least.min(radii[n.1] + GROWTH * length(&n));
+                let mut radius = search.nearest(i, neighbours).fold(spacing.radius, smooth);
                 limit(std::slice::from_mut(&mut spacing), std::slice::from_mut(&mut radius), reach);
                 found.push((spacing, radius));
             }
@@ -243,6 +237,12 @@ impl<'a> Search<'a> {
         plain
     }
 
+    /// Returns the spacing of point `i` of the block. Only points that are not `plain` are looked at
+    /// singly.
+    fn spacing(&mut self, i: usize, neighbours: usize, plain: u64) -> Spacing {
+        if plain >> (i % WIDTH) & 1 == 1 { self.area(i, neighbours) } else { self.examine(i, neighbours) }
+    }
+
     /// Returns the spacing of point `i` of the block, whose neighbours spread over an area.
     fn area(&self, i: usize, neighbours: usize) -> Spacing {
         let last = self.found.ranked(i % WIDTH, neighbours - 1);
@@ -266,12 +266,18 @@ impl<'a> Search<'a> {
         let mut near = std::mem::take(&mut self.near);
         near.clear();
         near.push((0.0, i));
-        near.extend(self.found.of(i % WIDTH).take(count).map(|n| self.exact(i, n.id as usize)));
+        near.extend(self.nearest(i, count));
         self.near = near;
     }
 
+    /// Returns the squared distances and indices of the nearest `count` neighbours of point `i` of the
+    /// block, of those that have been found.
+    fn nearest(&self, i: usize, count: usize) -> impl Iterator<Item = (f64, usize)> + '_ {
+        self.found.of(i % WIDTH).take(count).map(move |n| self.exact(i, n.id as usize))
+    }
+
     /// Returns the spacing of point `i` of the block, examining as many neighbours as needed.
-    fn spacing(&mut self, i: usize, neighbours: usize) -> Spacing {
+    fn examine(&mut self, i: usize, neighbours: usize) -> Spacing {
         self.look(i, neighbours);
         let radius = self.near.last().map_or(0.0, length);
         let mut sums = Sums::default();

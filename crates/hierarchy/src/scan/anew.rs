@@ -39,7 +39,7 @@ pub(crate) fn fitted_anew(
     let bare = Bare::new(&work, topology, &boxes)?;
     let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
     let leaves: Vec<u32> = (0..topology.leaves()).map(id32).collect();
-    let codes = codes_of(&index, &positions, &fits, &leaves);
+    let codes = codes_of(&index, &positions, |i| fits[i], &leaves);
     let mut normals: Vec<[f32; 3]> = fits.iter().map(|fit| fit.normal).collect();
     align_leaves(&mut normals, topology.leaf_size());
     let arrays = Arrays {

@@ -69,8 +69,18 @@ impl Closing {
         principal_axes(scan.positions(), &scan.topology, &mut self.boxes, memory);
     }
 
-    /// Fits boxes and enclosures along the axes.
+    /// Fits boxes and enclosures of all nodes along the axes.
     pub(crate) fn bound(&mut self, scan: &mut PointHierarchy) {
+        self.bound_above(scan, |_| true);
+    }
+
+    /// Fits the boxes and enclosures of the `changed` leaves and of the nodes above them. Those of all
+    /// other nodes must be up to date.
+    pub(crate) fn bound_above(
+        &mut self,
+        scan: &mut PointHierarchy,
+        changed: impl Fn(usize) -> bool + Sync + Send,
+    ) {
         let PointHierarchy { meta, plan, topology, arrays, .. } = scan;
         let Self { parts, boxes, growths, .. } = self;
         let discs = DiscRadii {
@@ -80,10 +90,15 @@ impl Closing {
             sampling_radius: meta.sampling_radius,
         };
         let of_points = Parts { normals: &arrays.normals, discs, dense: meta.dense as usize };
-        change_each(parts, WIDTH, |number, part| *part = of_points.block(number));
+        let leaf_of = |point: usize| point.min(of_points.normals.len() - 1) / topology.leaf_size();
+        change_each(parts, WIDTH, |number, part| {
+            if (leaf_of(number * WIDTH)..=leaf_of((number + 1) * WIDTH - 1)).any(&changed) {
+                *part = of_points.block(number);
+            }
+        });
         let greatest = arrays.radii.iter().copied().fold(0.0, f32::max);
         let beyond = 0.5 * plan.support_radius(greatest);
-        bound_parts(topology, (boxes, growths), (&arrays.blocks, parts), beyond);
+        bound_parts(topology, (boxes, growths), (&arrays.blocks, parts), beyond, changed);
         siblings(topology, boxes, arrays.siblings.to_mut());
         reaches(topology, boxes, arrays.reaches.to_mut());
         let growths: &[[Growth; 2]] = growths;

@@ -6,13 +6,16 @@ use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{change_each, change_runs, fill};
 use nearmiss_lanes::vector::dot;
+use nearmiss_lanes::wide::blocks_of;
 
-use crate::patch::classes::vote_among;
+use crate::patch::classes::votes;
 use crate::patch::surfels::{Fit, align, codes_of, fits_of};
 use crate::point::affine::{Motion, Rest};
+use crate::point::disc::PointCode;
 use crate::point::spacing::{Look, spacings_of};
 use crate::scan::build::PointHierarchy;
 use crate::scan::closing::Closing;
+use crate::tree::topology::Topology;
 
 /// The greatest change of lengths in the tangent planes of a leaf, as a factor or its reciprocal, for
 /// which its discs are carried along.
@@ -97,6 +100,11 @@ impl Memory {
         });
     }
 
+    /// Returns `true` if a leaf is to be fitted anew.
+    fn is_changed(&self, leaf: usize) -> bool {
+        !self.motions[leaf].is_carried
+    }
+
     /// Takes a leaf as it is in `scan` for its state at rest.
     fn rest(&mut self, scan: &PointHierarchy, leaf: usize) {
         let points = scan.topology().points_of_leaf(leaf);
@@ -113,24 +121,44 @@ pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &Nex
     memory.settle(scan);
     place(scan, placed);
     carry(scan, memory);
-    let topology = scan.topology;
-    memory.changed.clear();
-    let is_changed = |leaf: &usize| !memory.motions[*leaf].is_carried;
-    memory.changed.extend((0..topology.leaves()).filter(is_changed).map(id32));
-    let changed = std::mem::take(&mut memory.changed);
-    let spaced = if changed.is_empty() { None } else { Some(space(scan, memory, &changed)) };
-    memory.closing.support(scan);
-    memory.closing.turn(scan);
-    memory.closing.bound(scan);
-    if let Some(looks) = spaced {
-        // The boxes so far contain the points, which suffices to find neighbours.
-        fit(scan, memory, &changed, &looks);
-        memory.closing.bound(scan);
-    }
-    let fitted = changed.iter().map(|leaf| topology.points_of_leaf(*leaf as usize).len()).sum();
+    let mut changed = std::mem::take(&mut memory.changed);
+    changed.clear();
+    changed.extend((0..scan.topology.leaves()).filter(|leaf| memory.is_changed(*leaf)).map(id32));
+    let fitted = close(scan, memory, &changed);
     memory.changed = changed;
-    memory.closing.finish(scan);
     Refitted { carried: scan.len() - fitted, fitted }
+}
+
+/// Fits the points of the `changed` leaves anew and bounds all nodes. Returns the number of these points.
+fn close(scan: &mut PointHierarchy, memory: &mut Memory, changed: &[u32]) -> usize {
+    if changed.is_empty() {
+        memory.closing.support(scan);
+        memory.closing.turn(scan);
+        memory.closing.bound(scan);
+    } else {
+        let blocks = blocks_of_leaves(&scan.topology, changed);
+        let boxes = BlockBoxes::new(&scan.arrays.blocks, scan.len());
+        let looks = space(scan, memory, &boxes, &blocks);
+        memory.closing.support(scan);
+        memory.closing.turn(scan);
+        memory.closing.bound(scan);
+        // The boxes so far contain the points, which suffices to find neighbours.
+        fit(scan, memory, (&boxes, &blocks), changed, &looks);
+        let Memory { closing, motions, .. } = memory;
+        closing.bound_above(scan, |leaf| !motions[leaf].is_carried);
+    }
+    memory.closing.finish(scan);
+    changed.iter().map(|leaf| scan.topology.points_of_leaf(*leaf as usize).len()).sum()
+}
+
+/// Returns the blocks with points of some leaves, ascending.
+fn blocks_of_leaves(topology: &Topology, leaves: &[u32]) -> Vec<u32> {
+    let mut blocks: Vec<u32> = Vec::new();
+    for leaf in leaves {
+        blocks.extend(blocks_of(&topology.points_of_leaf(*leaf as usize)).map(id32));
+    }
+    blocks.dedup();
+    blocks
 }
 
 /// Sets the positions and the frame.
@@ -188,78 +216,125 @@ fn carry(scan: &mut PointHierarchy, memory: &mut Memory) {
     });
 }
 
-/// Measures the spacing of the points of the `changed` leaves anew. Returns a function that tells the
-/// appearance of their neighbours.
+/// Measures the spacing of the points of the changed leaves, which have these `blocks`, anew. Returns a
+/// function that tells the appearance of their neighbours.
 fn space(
     scan: &mut PointHierarchy,
     memory: &Memory,
-    changed: &[u32],
+    boxes: &BlockBoxes,
+    blocks: &[u32],
 ) -> impl Fn(usize) -> Look + Sync + Send + use<> {
-    let topology = scan.topology;
-    let mut blocks: Vec<u32> = Vec::new();
-    for leaf in changed {
-        let points = topology.points_of_leaf(*leaf as usize);
-        blocks.extend((points.start / WIDTH..points.end.div_ceil(WIDTH)).map(id32));
-    }
-    blocks.dedup();
-    let boxes = BlockBoxes::new(&scan.arrays.blocks, scan.len());
     let options = (scan.meta.radius_neighbours as usize, scan.meta.reach);
     let found =
-        spacings_of(scan.positions(), &boxes.over(&scan.arrays.blocks), options, &scan.arrays.radii, &blocks);
-    let leaf_size = topology.leaf_size();
+        spacings_of(scan.positions(), &boxes.over(&scan.arrays.blocks), options, &scan.arrays.radii, blocks);
+    let leaf_size = scan.topology.leaf_size();
     let radii = scan.arrays.radii.to_mut();
     for (block, found) in blocks.iter().zip(found.chunks(WIDTH)) {
         let first = *block as usize * WIDTH;
         for (i, (_, radius)) in (first..radii.len()).zip(found) {
-            if !memory.motions[i / leaf_size].is_carried {
+            if memory.is_changed(i / leaf_size) {
                 radii[i] = radius.max(LEAST_RADIUS);
             }
         }
     }
+    let blocks = blocks.to_vec();
     move |i| {
         blocks.binary_search(&id32(i / WIDTH)).map_or(Look::Area, |k| found[k * WIDTH + i % WIDTH].0.look())
     }
 }
 
-/// Fits the surface at the points of the `changed` leaves anew, and takes them as they are then for
-/// their state at rest.
+/// Fits the surface at the points of the `changed` leaves, which have these `blocks`, anew, and takes
+/// them as they are then for their state at rest.
 fn fit(
     scan: &mut PointHierarchy,
     memory: &mut Memory,
+    (boxes, blocks): (&BlockBoxes, &[u32]),
     changed: &[u32],
     looks: &(impl Fn(usize) -> Look + Sync + Send),
 ) {
-    let (topology, leaf_size) = (scan.topology, scan.topology.leaf_size());
-    let points = || changed.iter().flat_map(|leaf| topology.points_of_leaf(*leaf as usize));
-    let (positions, radii) = (scan.positions(), scan.radii());
-    let new = fits_of(&scan.index(), positions, radii, looks, changed);
-    let mut fits: Vec<Fit> =
-        scan.normals().iter().zip(&*scan.arrays.codes).map(|(n, code)| Fit::new(*n, code.kind())).collect();
-    for (i, fit) in points().zip(new) {
-        fits[i] = fit;
-    }
-    let blocks = &scan.arrays.blocks;
-    let boxes = BlockBoxes::new(blocks, scan.len());
-    let is_changed = |i: usize| !memory.motions[i / leaf_size].is_carried;
-    vote_among(&boxes.over(blocks), positions, radii, &mut fits, is_changed);
-    let codes = codes_of(&scan.index(), positions, &fits, changed);
+    let topology = scan.topology;
+    let new = fits_of(&scan.index(), scan.positions(), scan.radii(), looks, changed);
     let is_oriented = scan.meta.is_oriented;
-    let normals = scan.arrays.normals.to_mut();
-    for leaf in changed {
-        let points = topology.points_of_leaf(*leaf as usize);
-        for i in points.clone() {
-            let (n, before) = (fits[i].normal, normals[i]);
-            normals[i] = if is_oriented && dot(n, before) < 0.0 { n.map(|c| -c) } else { n };
+    let points = || changed.iter().flat_map(|leaf| topology.points_of_leaf(*leaf as usize));
+    for (i, mut fit) in points().zip(new) {
+        // The normals of an oriented scan keep their side. Votes take over normals of the right side.
+        if is_oriented && dot(fit.normal, scan.normals()[i]) < 0.0 {
+            fit.normal = fit.normal.map(|c| -c);
         }
-        if !is_oriented {
-            align(&mut normals[points]);
+        set(scan, i, fit);
+    }
+    let tree = boxes.over(&scan.arrays.blocks);
+    let known =
+        |scan: &PointHierarchy, i: usize| Fit::new(scan.arrays.normals[i], scan.arrays.codes[i].kind());
+    let corrected = votes(
+        &tree,
+        scan.positions(),
+        scan.radii(),
+        |i| known(scan, i),
+        (blocks.len(), |k| blocks[k] as usize),
+    );
+    for (i, fit) in corrected {
+        if memory.is_changed(i as usize / topology.leaf_size()) {
+            set(scan, i as usize, fit);
         }
     }
+    let codes = codes_of(&scan.index(), scan.positions(), |i| known(scan, i), changed);
     let all = scan.arrays.codes.to_mut();
     for (i, code) in points().zip(codes) {
         all[i] = code;
     }
     for leaf in changed {
+        if !is_oriented {
+            align(&mut scan.arrays.normals.to_mut()[topology.points_of_leaf(*leaf as usize)]);
+        }
         memory.rest(scan, *leaf as usize);
+    }
+}
+
+/// Sets normal and class of a point, with no gap among its neighbours.
+fn set(scan: &mut PointHierarchy, i: usize, fit: Fit) {
+    scan.arrays.normals.to_mut()[i] = fit.normal;
+    scan.arrays.codes.to_mut()[i] = PointCode::new(fit.kind(), 0);
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_geometry::PointCloud;
+
+    use super::*;
+    use crate::scan::options::BuildOptions;
+
+    /// Moves a sheet of points. One corner of it folds, so its leaves are fitted anew.
+    fn folded() -> (PointHierarchy, Memory, Refitted) {
+        let sheet = |fold: f64| -> Vec<[f64; 3]> {
+            let lattice = (0..3_600_u32).map(|i| [f64::from(i % 60), f64::from(i / 60)]);
+            lattice.map(|[x, y]| [x, y, 0.002 * x * x + fold * (x + y - 90.0).max(0.0)]).collect()
+        };
+        let cloud = PointCloud::from_positions(&sheet(0.0)).unwrap();
+        let mut scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let (mut memory, points) = (Memory::at_rest(), sheet(1.0));
+        let bounds = Aabb::of(points.iter().copied());
+        let placed = NextFrame { points: &points, frame: *scan.frame(), bounds, step: scan.meta.step };
+        let refitted = refit(&mut scan, &mut memory, &placed);
+        (scan, memory, refitted)
+    }
+
+    #[test]
+    fn bounds_above_changed_leaves_are_those_of_all_nodes_computed_anew() {
+        let (mut scan, mut memory, refitted) = folded();
+        assert!(refitted.fitted > 100 && refitted.carried > 2_000, "{refitted:?}");
+        let bounds = |scan: &PointHierarchy| {
+            let arrays = &scan.arrays;
+            let bytes: [&[u8]; 4] = [
+                bytemuck::cast_slice(&arrays.siblings),
+                bytemuck::cast_slice(&arrays.reaches),
+                bytemuck::cast_slice(&arrays.surface_growths),
+                bytemuck::cast_slice(&arrays.obstacle_growths),
+            ];
+            bytes.map(<[u8]>::to_vec)
+        };
+        let partial = bounds(&scan);
+        memory.closing.bound(&mut scan);
+        assert!(partial == bounds(&scan));
     }
 }
