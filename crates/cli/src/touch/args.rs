@@ -1,10 +1,11 @@
 //! The options of `touch`.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 
-use crate::parse::parse_radius;
+use crate::parse::{parse_duration, parse_radius, parse_work};
 use crate::preprocess::parse_threads;
 
 /// Options of `touch`.
@@ -51,6 +52,16 @@ pub struct TouchArgs {
     /// Without it, the way out may lead to either side of the surface.
     #[arg(long, requires = "penetration", conflicts_with = "thickened")]
     pub solid: bool,
+    /// Time limit for the penetration of each shape, such as 2ms; for --penetration
+    ///
+    /// The unit is ns, us, ms or s. When time runs out, both bounds hold, but are less tight.
+    #[arg(long, value_name = "2ms", requires = "penetration", allow_hyphen_values = true, value_parser = parse_duration)]
+    pub budget: Option<Duration>,
+    /// Work limit for the penetration of each shape; reproducible, unlike time
+    ///
+    /// A unit is one test of the moved shape against the scan.
+    #[arg(long, value_name = "N", requires = "penetration", value_parser = parse_work)]
+    pub work: Option<u64>,
     /// Threads to prepare a raw input; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
     pub threads: Option<usize>,

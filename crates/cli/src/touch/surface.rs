@@ -1,8 +1,10 @@
 //! Shapes against the surface of a scan.
 
+use std::time::Duration;
+
 use nearmiss::{
-    Budget, CollideOptions, Interior, Placed, Reason, Scratch, Semantics, Shape, ShapeContact, ShapePlan,
-    ShapeVerdict, Target,
+    Budget, CollideOptions, Deadline, Interior, Placed, Reason, Scratch, Semantics, Shape, ShapeContact,
+    ShapePlan, ShapeVerdict, Target,
 };
 use serde::Serialize;
 
@@ -21,6 +23,9 @@ pub(super) struct Asked {
     margin: f64,
     /// The inside of the scan, if the penetration is wanted.
     interior: Option<Interior>,
+    /// Limits for each penetration.
+    time: Option<Duration>,
+    work: Option<u64>,
 }
 
 impl Asked {
@@ -43,7 +48,23 @@ impl Asked {
         };
         let of_scan = if args.solid { Interior::Solid } else { Interior::Hollow };
         let interior = args.penetration.then_some(of_scan);
-        Ok(Some(Self { semantics, margin: args.margin.unwrap_or(0.0), interior }))
+        Ok(Some(Self {
+            semantics,
+            margin: args.margin.unwrap_or(0.0),
+            interior,
+            time: args.budget,
+            work: args.work,
+        }))
+    }
+}
+
+impl Asked {
+    /// Returns the budget of a penetration that starts now.
+    fn budget(&self) -> Budget {
+        let mut budget = Budget::UNLIMITED;
+        budget.work = self.work;
+        budget.deadline = self.time.and_then(|time| now().checked_add(time)).map(Deadline::at);
+        budget
     }
 }
 
@@ -85,7 +106,7 @@ pub(super) fn of_surface(
         };
         let penetration = asked
             .interior
-            .map(|interior| target.penetration(&shape, interior, &Budget::UNLIMITED, &mut scratch));
+            .map(|interior| target.penetration(&shape, interior, &asked.budget(), &mut scratch));
         report.penetration = penetration.as_ref().map(PenetrationReport::new);
         if is_json {
             results.json(&report)?;

@@ -1,6 +1,7 @@
 //! `touch`.
 
 use nearmiss_testdata::shapes::sphere;
+use serde_json::Value;
 
 use crate::running::{Place, keys, numbers, shift, sorted};
 
@@ -177,6 +178,22 @@ fn a_penetration_tells_the_way_out_of_a_ball() {
     assert!(hollow[1]["penetration"].is_null(), "{hollow:?}");
     let words = place.ok(&[&asked[..6], &["--solid"]].concat()).results;
     assert!(words.contains("Moving it by 0.5"), "{words}");
+    let limited = place.ok(&[&asked[..], &["--solid", "--work", "8"]].concat()).json();
+    for (line, whole) in limited.iter().zip(&solid).take(2) {
+        let ([found, whole], bound) =
+            ([&line["penetration"], &whole["penetration"]], |found: &Value, key| {
+                found[key].as_f64().unwrap()
+            });
+        assert!(found["complete"] == false && whole.get("complete").is_none(), "{line}");
+        assert!(
+            bound(found, "upper") >= bound(whole, "lower") && bound(found, "lower") <= bound(whole, "upper"),
+            "{line}"
+        );
+    }
+    let at_once = place.ok(&[&asked[..], &["--budget", "1ns"]].concat()).json();
+    assert!(at_once[0]["penetration"]["complete"] == false, "{at_once:?}");
+    let refused = place.run(&["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--surface", "--work", "9"]);
+    assert!(refused.status == 2 && refused.errors.contains("--penetration"), "{}", refused.errors);
     let refused = place.run(&["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--penetration"]);
     assert!(refused.status == 2 && refused.errors.contains("add --surface"), "{}", refused.errors);
 }

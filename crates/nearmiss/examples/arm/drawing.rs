@@ -15,20 +15,26 @@ const DOTS: usize = 12_000;
 /// Colours from no clearance to the greatest.
 const COLOURS: [&str; 5] = ["#b2182b", "#ef7832", "#f4cd5a", "#86b86a", "#3e9668"];
 
+/// The arm at one time.
+#[derive(Debug)]
+pub(crate) struct Moment {
+    pub(crate) links: [Shape<'static>; LINKS],
+    /// Places on the tool.
+    pub(crate) tool: Vec<[f64; 3]>,
+    /// The distance from the room.
+    pub(crate) apart: f64,
+}
+
 /// Draws the arm at all moments with its distance from the room as colour.
-pub(crate) fn svg(
-    scan: &Scan,
-    arm: &Arm,
-    moments: &[([Shape<'static>; LINKS], f64)],
-) -> Result<String, Error> {
+pub(crate) fn svg(scan: &Scan, arm: &Arm<'_>, moments: &[Moment]) -> Result<String, Error> {
     let mut out = String::new();
     let (wide, tall) = (2.0 * SIZE + 30.0, SIZE + 80.0);
     writeln!(out, r#"<svg xmlns="http://www.w3.org/2000/svg" width="{wide}" height="{tall}">"#)?;
     writeln!(out, r##"<rect width="100%" height="100%" fill="#ffffff"/>"##)?;
-    let highest = moments.iter().map(|(_, apart)| *apart).fold(f64::MIN_POSITIVE, f64::max);
+    let highest = moments.iter().map(|moment| moment.apart).fold(f64::MIN_POSITIVE, f64::max);
     // Nearest last, so that it is on top.
     let mut order: Vec<usize> = (0..moments.len()).collect();
-    order.sort_by(|&a, &b| moments[b].1.total_cmp(&moments[a].1));
+    order.sort_by(|&a, &b| moments[b].apart.total_cmp(&moments[a].apart));
     for (view, axes, across) in [(0.0, [0, 1], 2), (1.0, [0, 2], 1)] {
         let scale = SIZE / (3.2 * arm.length);
         let left = 10.0 + view * (SIZE + 10.0);
@@ -49,7 +55,7 @@ pub(crate) fn svg(
             writeln!(out, r##"<circle cx="{x:.1}" cy="{y:.1}" r="1.2" fill="#9aa4b2"/>"##)?;
         }
         for &moment in &order {
-            let (links, apart) = &moments[moment];
+            let Moment { links, tool, apart } = &moments[moment];
             let colour = COLOURS[share(apart / highest)];
             for link in links {
                 let Shape::Capsule { ends, radius } = link else { continue };
@@ -59,6 +65,10 @@ pub(crate) fn svg(
                 let width = 2.0 * radius * scale;
                 writeln!(out, r##"<line {line} stroke="#ffffff" stroke-width="{:.1}"/>"##, width + 1.5)?;
                 writeln!(out, r#"<line {line} stroke="{colour}" stroke-width="{width:.1}"/>"#)?;
+            }
+            for p in tool {
+                let [x, y] = place(*p);
+                writeln!(out, r#"<circle cx="{x:.1}" cy="{y:.1}" r="1.6" fill="{colour}"/>"#)?;
             }
         }
         let title = if view == 0.0 { "from above" } else { "from the side" };

@@ -1,7 +1,8 @@
 //! A six-link arm of capsules in a scanned room: finds a path of its joints that is proven free of the
-//! room and of the arm itself, and draws it with the clearance as colour.
+//! room and of the arm itself, and draws it with the clearance as colour. All bodies are in one `World`.
 //!
-//! `cargo run --release -p nearmiss --example arm [SCAN [OUT.svg [X,Y,Z]]]`, z up; the arm stands at X,Y,Z
+//! `cargo run --release -p nearmiss --example arm [SCAN [OUT.svg [X,Y,Z [TOOL]]]]`, z up; the arm stands at
+//! X,Y,Z, and has the scan TOOL, shrunk, in its hand
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 mod arm;
@@ -9,11 +10,13 @@ mod drawing;
 
 use std::error::Error;
 use std::f64::consts::PI;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use arm::{Angles, Arm, Near, between, prove};
+use arm::{Angles, Arm, between, prove};
+use drawing::Moment;
 use nearmiss::{
-    BuildOptions, Check, CollideOptions, PointCloud, Pose, Scan, Scratch, Shape, ShapePlan, Target,
+    BuildOptions, Check, CollideOptions, DistanceOptions, DistancePlan, NearestPair, PointCloud, Pose, Scan,
+    Scratch, Shape, ShapePlan, Target,
 };
 use nearmiss_testdata::arbitrary::rng;
 use rand::RngExt;
@@ -27,23 +30,24 @@ const SHOWN: u32 = 12;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args_os().skip(1);
-    let scan = match words.next().map(PathBuf::from) {
-        Some(path) if path.extension().is_some_and(|end| end == "nm") => Scan::open(&path, Check::Structure)?,
-        Some(path) => Scan::build(&nearmiss::io::read(&path, None)?.cloud, &BuildOptions::default())?,
+    let scan = match words.next() {
+        Some(path) => open(&PathBuf::from(path))?,
         None => Scan::build(&PointCloud::from_positions(&room())?, &BuildOptions::default())?,
     };
     let picture = words.next().map_or_else(|| PathBuf::from("arm.svg"), PathBuf::from);
     let place = words.next().and_then(|word| word.to_str().map(numbers)).unwrap_or_default();
-    let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
-    let target = Target::new(scan.at(&Pose::IDENTITY), &plan);
+    let tool = words.next().map(|path| open(&PathBuf::from(path))).transpose()?;
     let mut scratch = Scratch::default();
 
     let base = <[f64; 3]>::try_from(place).unwrap_or_else(|_| scan.bounds().centre());
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
     let dot = Shape::Sphere { centre: base, radius: 0.0 };
-    let room_for = target.distance(&dot, f64::INFINITY, &mut scratch).map_or(1.0, |found| found.upper);
+    let room_for = Target::new(scan.at(&Pose::IDENTITY), &plan).distance(&dot, f64::INFINITY, &mut scratch);
     // Longer than the room around its base, so that the path must go about things.
-    let arm = Arm { base, length: 1.6 * room_for };
-    println!("an arm {:.3} long at {base:.3?}, among {} points", arm.length, scan.len());
+    let length = 1.6 * room_for.map_or(1.0, |found| found.upper);
+    let plan = DistancePlan::new(&DistanceOptions::default(), &scan, tool.as_ref().unwrap_or(&scan))?;
+    let mut arm = Arm::new(&scan, (base, length), tool.as_ref(), plan);
+    println!("an arm {length:.3} long at {base:.3?}, among {} points", scan.len());
 
     let mut rng = rng(5);
     let mut path: Vec<Angles> = vec![[0.0, -1.2, 2.0, 0.0, 1.0, 0.0]];
@@ -55,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let goal: Angles =
             std::array::from_fn(|k| rng.random_range(-1.0..1.0) * if k == 1 { 0.9 } else { PI });
         let Some(start) = path.last() else { break };
-        match prove(&arm, &target, [start, &goal], &mut scratch) {
+        match prove(&mut arm, [start, &goal], &mut scratch) {
             Ok(proof) => {
                 intervals += proof.intervals;
                 clearance = clearance.min(proof.clearance);
@@ -68,24 +72,35 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("all pairs keep more than {clearance:.2e}, proven");
 
     let mut moments = Vec::new();
-    let mut nearest: Option<[Near; 2]> = None;
+    let mut nearest: [Option<NearestPair>; 2] = [None; 2];
     for leg in path.windows(2) {
         for step in 0..=SHOWN {
             let angles = between([&leg[0], &leg[1]], f64::from(step) / f64::from(SHOWN));
-            let own = arm.nearest_pairs(&target, &angles, &mut scratch);
-            moments.push((arm.links(&angles), own[0].upper));
-            let nearer =
-                |k: usize| nearest.map(|it| it[k]).filter(|it| it.upper < own[k].upper).unwrap_or(own[k]);
-            nearest = Some([nearer(0), nearer(1)]);
+            arm.turn_to(&angles);
+            let own = arm.nearest_pairs(&mut scratch);
+            let apart = own[0].map_or(0.0, |pair| pair.upper);
+            moments.push(Moment { links: arm.links(&angles), tool: arm.tool(), apart });
+            for (best, own) in nearest.iter_mut().zip(own) {
+                let is_nearer = |own: &NearestPair| best.is_none_or(|best| own.upper < best.upper);
+                *best = own.filter(is_nearer).or(*best);
+            }
         }
     }
     for near in nearest.into_iter().flatten() {
-        let other = near.other.map_or("the room".into(), |other| format!("link {other}"));
-        println!("nearest among the times shown: link {} and {other}, {:.4} apart", near.link, near.upper);
+        let [a, b] = near.ids.map(|id| arm.name(id));
+        println!("nearest among the times shown: {b} and {a}, {:.4} apart", near.upper);
     }
     std::fs::write(&picture, drawing::svg(&scan, &arm, &moments)?)?;
     println!("drawn in {}", picture.display());
     Ok(())
+}
+
+/// Opens a prepared scan, or prepares the points of a file.
+fn open(path: &Path) -> Result<Scan, Box<dyn Error>> {
+    if path.extension().is_some_and(|end| end == "nm") {
+        return Ok(Scan::open(path, Check::Structure)?);
+    }
+    Ok(Scan::build(&nearmiss::io::read(path, None)?.cloud, &BuildOptions::default())?)
 }
 
 fn numbers(text: &str) -> Vec<f64> {
