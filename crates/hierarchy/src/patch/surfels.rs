@@ -38,9 +38,12 @@ const LINE: f64 = 0.05;
 #[repr(C)]
 pub(crate) struct Fit {
     pub(crate) normal: [f32; 3],
-    /// The code of the kind.
+    /// The code of the kind, and above it one more than the gap; 0 if that is unknown.
     code: u32,
 }
+
+/// The number of bits of [`Fit::code`] below the gap.
+const GAP: u32 = 8;
 
 impl Default for Fit {
     fn default() -> Self {
@@ -49,8 +52,15 @@ impl Default for Fit {
 }
 
 impl Fit {
+    /// A fit with an unknown gap.
     pub(crate) fn new(normal: [f32; 3], kind: PointKind) -> Self {
         Self { normal, code: kind.code().into() }
+    }
+
+    /// Returns the code of the point, and `false` if its gap is unknown and taken for 0.
+    pub(crate) fn point_code(&self) -> (PointCode, bool) {
+        let gap = self.code >> GAP;
+        (PointCode::new(self.kind(), gap.saturating_sub(1)), gap > 0)
     }
 
     /// The point's class.
@@ -104,6 +114,9 @@ struct LeafScratch {
     wide: Vec<u32>,
     halves: Vec<HalfBlock>,
     fits: Vec<Moments>,
+    /// The lists `near` of all points of a leaf, one after the other, and the end of each.
+    lists: Vec<u32>,
+    ends: Vec<usize>,
 }
 
 /// The inputs for the discs of all points, in order.
@@ -119,11 +132,12 @@ pub(crate) struct Known<'a> {
     pub(crate) dense: usize,
 }
 
-/// Fits the surface at every point and classifies the points. O(n).
+/// Fits the surface at every point and classifies the points, with their gaps if `gaps`. O(n).
 pub(crate) fn fits(
     index: &Index<'_>,
     positions: &[[f32; 3]],
     (radii, spacings): (&[f32], &[Spacing]),
+    gaps: bool,
     work: &Workspace,
 ) -> Result<Room<Fit>, WorkError> {
     let (topology, level) = (index.tree.topology, Level::new());
@@ -134,16 +148,15 @@ pub(crate) fn fits(
             let (points, about) = leaf(index, number);
             let spacings = &spacings[points.clone()];
             let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points], about: &about };
-            dispatch!(level, simd => leaf.fit(simd, index, &mut scratch, |at, i| {
-                fits.push(fitted(&at, spacings[i].look()));
-            }));
+            let look = |i: usize| spacings[i].look();
+            dispatch!(level, simd => leaf.fit(simd, index, (look, gaps), &mut scratch, &mut fits));
         }
         fits
     });
     Ok(all)
 }
 
-/// Fits the surface at the points of some leaves, in order. `looks` has their appearance.
+/// Fits the surface at the points of some leaves, in order, with their gaps. `looks` has their appearance.
 pub(crate) fn fits_of(
     index: &Index<'_>,
     positions: &[[f32; 3]],
@@ -158,43 +171,37 @@ pub(crate) fn fits_of(
             let (points, about) = leaf(index, *number as usize);
             let first = points.start;
             let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points], about: &about };
-            dispatch!(level, simd => leaf.fit(simd, index, &mut scratch, |at, i| {
-                fits.push(fitted(&at, looks(first + i)));
-            }));
+            let look = |i: usize| looks(first + i);
+            dispatch!(level, simd => leaf.fit(simd, index, (look, true), &mut scratch, &mut fits));
         }
         fits
     });
     some.into_iter().flatten().collect()
 }
 
-/// Returns the codes of the points of some leaves, in order. `fit` returns the fit of a point.
-pub(crate) fn codes_of(
+/// Returns the gaps of some points, in order. `normal` returns the normal of a point.
+pub(crate) fn gaps_of(
     index: &Index<'_>,
     positions: &[[f32; 3]],
-    fit: impl Fn(usize) -> Fit + Sync + Send,
-    leaves: &[u32],
-) -> Vec<PointCode> {
+    normal: impl Fn(usize) -> [f32; 3] + Sync + Send,
+    points: &[u32],
+) -> Vec<u32> {
     let level = Level::new();
-    let some = chunks(leaves, |leaves| {
-        let (mut groups, mut near, mut codes) = (Vec::new(), Vec::new(), Vec::new());
-        for number in leaves {
-            let (points, about) = leaf(index, *number as usize);
-            let own = positions[points.clone()].iter().map(|p| sub(*p, about.centre)).map(|d| dot(d, d));
-            index.collect(level, about.centre, own.fold(0.0, f32::max).sqrt() * GROWN, &mut groups);
-            for i in points {
-                let (p, fit) = (positions[i], fit(i));
-                let gap = dispatch!(level, simd => simd.vectorize(
-                    #[inline(always)]
-                    || {
-                        let near = index.supporting(simd, &groups, p, 0.0, &mut near);
-                        let blocks = near.iter().map(|&block| &index.blocks[block as usize]);
-                        widest_gap(simd, p, fit.normal, blocks)
-                    },
-                ));
-                codes.push(PointCode::new(fit.kind(), gap));
-            }
+    let some = chunks(points, |points| {
+        let (mut groups, mut near, mut gaps) = (Vec::new(), Vec::new(), Vec::new());
+        for &point in points {
+            let (p, normal) = (positions[point as usize], normal(point as usize));
+            index.collect(level, p, 0.0, &mut groups);
+            gaps.push(dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || {
+                    let near = index.supporting(simd, &groups, p, 0.0, &mut near);
+                    let blocks = near.iter().map(|&block| &index.blocks[block as usize]);
+                    widest_gap(simd, p, normal, blocks)
+                },
+            )));
         }
-        codes
+        gaps
     });
     some.into_iter().flatten().collect()
 }
@@ -278,19 +285,21 @@ struct Leaf<'a> {
 }
 
 impl Leaf<'_> {
-    /// Evaluates f at every point.
+    /// Appends the fits of all points to `found`. `look` returns the appearance of a point; `gaps` tells
+    /// whether gaps are wanted.
     #[inline(always)]
     fn fit<S: Simd>(
         &self,
         simd: S,
         index: &Index<'_>,
+        (look, gaps): (impl Fn(usize) -> Look, bool),
         scratch: &mut LeafScratch,
-        mut found: impl FnMut(Evaluation, usize),
+        found: &mut Vec<Fit>,
     ) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let LeafScratch { locality, blocks, near, halves, fits, .. } = scratch;
+                let LeafScratch { locality, blocks, near, halves, fits, lists, ends, .. } = scratch;
                 let middle = self.about.centre;
                 let own = self.positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
                 let own = own.fold(0.0, f32::max).sqrt();
@@ -299,14 +308,30 @@ impl Leaf<'_> {
                 blocks.clear();
                 blocks.extend(locality.blocks.iter().map(|&block| index.blocks[block as usize]));
                 fits.clear();
+                lists.clear();
+                ends.clear();
                 for p in self.positions {
                     let x = Centre::new(p.map(f64::from));
                     let mut sums = Neighbourhood::new(simd, index.plan, &x);
                     let near = locality.supporting(simd, x.rounded(), 0.0, near);
+                    lists.extend_from_slice(near);
+                    ends.push(lists.len());
                     sums.offer_all(simd, blocks, near, halves);
                     fits.push(sums.moments(simd));
                 }
-                Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| found(at, i));
+                let first = found.len();
+                Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| {
+                    found.push(fitted(&at, look(i)));
+                });
+                if gaps {
+                    let mut start = 0;
+                    for (i, fit) in found[first..].iter_mut().enumerate() {
+                        let near = lists[start..ends[i]].iter().map(|&place| &blocks[place as usize]);
+                        let gap = widest_gap(simd, self.positions[i], fit.normal, near);
+                        fit.code |= (gap + 1) << GAP;
+                        start = ends[i];
+                    }
+                }
             },
         );
     }

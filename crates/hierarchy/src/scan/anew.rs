@@ -7,10 +7,11 @@ use bytemuck::{Pod, Zeroable};
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::fill_runs;
+use nearmiss_lanes::parallel::{fill_runs, map_all};
 use nearmiss_store::{Array, Workspace};
 
-use crate::patch::surfels::{align_leaves, codes_of};
+use crate::patch::surfels::{align_leaves, gaps_of};
+use crate::point::disc::PointCode;
 use crate::point::gather::{Index, NeighbourList};
 use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::rough_groups;
@@ -38,9 +39,13 @@ pub(crate) fn fitted_anew(
     let groups = rough_groups(&blocks, &work)?;
     let bare = Bare::new(&work, topology, &boxes)?;
     let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
-    let leaves: Vec<u32> = (0..topology.leaves()).map(id32).collect();
-    let codes = codes_of(&index, &positions, |i| fits[i], &leaves);
-    let mut normals: Vec<[f32; 3]> = fits.iter().map(|fit| fit.normal).collect();
+    let mut codes = map_all(&fits, |fit| fit.point_code().0);
+    let unknown: Vec<u32> = (0..fits.len()).filter(|&i| !fits[i].point_code().1).map(id32).collect();
+    let gaps = gaps_of(&index, &positions, |i| fits[i].normal, &unknown);
+    for (&i, gap) in unknown.iter().zip(gaps) {
+        codes[i as usize] = PointCode::new(fits[i as usize].kind(), gap);
+    }
+    let mut normals = map_all(&fits, |fit| fit.normal);
     align_leaves(&mut normals, topology.leaf_size());
     let arrays = Arrays {
         blocks: blocks.into(),

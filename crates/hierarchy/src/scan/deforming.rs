@@ -11,7 +11,7 @@ use crate::scan::anew::fitted_anew;
 use crate::scan::build::PointHierarchy;
 use crate::scan::deform_error::{DeformError, bounds_of};
 use crate::scan::options::{BuildError, BuildOptions};
-use crate::scan::ordered::Ordered;
+use crate::scan::ordered::{Aim, Ordered};
 use crate::scan::organised::{Pixels, replace_organised};
 use crate::scan::points::{ScanPoints, step};
 use crate::scan::refit::{Memory, NextFrame, Refitted, refit};
@@ -19,10 +19,6 @@ use crate::scan::refit::{Memory, NextFrame, Refitted, refit};
 /// The greatest coordinate in units of the stored frame: beyond it, squares of squares of lengths
 /// leave the range of single precision.
 const FARTHEST: f64 = (1_u64 << 31) as f64;
-
-/// The share of sparse points that [`DeformingScan::replace`] leaves among the others, in leaves with loose
-/// boxes. A second tree without them would take a quarter of the time of a frame.
-const LEFT: f64 = 0.01;
 
 /// A prepared scan whose points move, while the order of its points and the nodes over them stay.
 ///
@@ -200,7 +196,7 @@ impl DeformingScan {
         options.check()?;
         let scan = on_threads(options.threads, || {
             let (points, work) = ((&cloud).into(), Workspace::in_memory());
-            let ordered = Ordered::new(&points, &options, LEFT, &work)?;
+            let ordered = Ordered::new(&points, &options, Aim::Follow, &work)?;
             fitted_anew(&points, ordered, &options, closing)
         })
         .or(Err(BuildError::Threads(options.threads)))??;

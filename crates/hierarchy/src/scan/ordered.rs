@@ -49,6 +49,26 @@ pub(crate) struct Summary {
     pub(crate) reach: f32,
 }
 
+/// The purpose of the points in order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// A scan that is prepared in full. Its gaps are found with its enclosures.
+    Prepare,
+    /// A frame of a scan that moves, with gaps at all points.
+    Follow,
+}
+
+impl Aim {
+    /// Returns the greatest share of sparse points that stay among the others, in leaves with loose boxes.
+    /// A second tree without them would take a quarter of the time of a frame.
+    const fn left(self) -> f64 {
+        match self {
+            Self::Prepare => 0.0,
+            Self::Follow => 0.01,
+        }
+    }
+}
+
 impl Ordered {
     /// Orders the points of a scan, or returns the result of an earlier process.
     pub(crate) fn of(
@@ -73,7 +93,7 @@ impl Ordered {
                 summary,
             });
         }
-        let ordered = Self::new(points, options, 0.0, work)?;
+        let ordered = Self::new(points, options, Aim::Prepare, work)?;
         let ordered = Self {
             boxes: stage.keep("boxes", ordered.boxes)?,
             positions: stage.keep("positions", ordered.positions)?,
@@ -88,12 +108,12 @@ impl Ordered {
     }
 
     /// Orders the points. A first tree of all points gives their spacing and the surface that they
-    /// sample. If a greater share of the points than `left` is sparse, a second tree separates them
-    /// from the others.
+    /// sample. If a greater share of the points is sparse than `aim` leaves among the others, a second
+    /// tree separates them.
     pub(crate) fn new(
         points: &ScanPoints<'_>,
         options: &BuildOptions,
-        left: f64,
+        aim: Aim,
         work: &Workspace,
     ) -> Result<Self, BuildError> {
         let (count, unit) = (points.positions.len(), 1.0 / points.frame.scale);
@@ -114,11 +134,11 @@ impl Ordered {
         drop(items);
         work.progress().reach(share::TREE);
         let mut ordered =
-            Self::classified(topology, boxes, (positions, source), (options, unit, count), work)?;
+            Self::classified(topology, boxes, (positions, source), (options, unit, count, aim), work)?;
         let Self { boxes, positions, source, radii, fits, blocks, plan, summary, .. } = &mut ordered;
         let sparse = fits.iter().filter(|fit| fit.kind().is_sparse()).count();
         #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
-        let are_many = sparse as f64 > left * count as f64;
+        let are_many = sparse as f64 > aim.left() * count as f64;
         let known = (|i: usize| positions[i], |i: usize| fits[i].kind());
         if are_many
             && let Some((mut items, before)) = dense_first(count, known, options.leaf_size as usize, work)?
@@ -154,7 +174,7 @@ impl Ordered {
         positions.copy_from_slice(points.positions);
         source.copy_from_slice(points.source);
         let unit = 1.0 / points.frame.scale;
-        Self::classified(topology, boxes, (positions, source), (options, unit, dense), work)
+        Self::classified(topology, boxes, (positions, source), (options, unit, dense, Aim::Follow), work)
     }
 
     /// Computes radii and classes of points in the order of a tree with these boxes.
@@ -162,7 +182,7 @@ impl Ordered {
         topology: Topology,
         mut boxes: Room<OrientedBox>,
         (positions, source): (Room<[f32; 3]>, Room<u32>),
-        (options, unit, dense): (&BuildOptions, f64, usize),
+        (options, unit, dense, aim): (&BuildOptions, f64, usize, Aim),
         work: &Workspace,
     ) -> Result<Self, BuildError> {
         let Sampling { spacings, radii, sampling_radius, reach, plan, blocks } =
@@ -170,7 +190,7 @@ impl Ordered {
         let groups = rough_groups(&blocks, work)?;
         let bare = Bare::new(work, topology, &boxes)?;
         let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
-        let mut fits = fits(&index, &positions, (&radii, &spacings), work)?;
+        let mut fits = fits(&index, &positions, (&radii, &spacings), aim == Aim::Follow, work)?;
         drop((bare, groups, spacings));
         work.progress().reach(share::FITS);
         let neighbours = BlockBoxes::new_in(work, &blocks, positions.len())?;

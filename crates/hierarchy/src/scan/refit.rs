@@ -9,7 +9,7 @@ use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::blocks_of;
 
 use crate::patch::classes::votes;
-use crate::patch::surfels::{Fit, align, codes_of, fits_of};
+use crate::patch::surfels::{Fit, align, fits_of, gaps_of};
 use crate::point::affine::{Motion, Rest};
 use crate::point::disc::PointCode;
 use crate::point::spacing::{Look, spacings_of};
@@ -255,8 +255,8 @@ fn fit(
     let topology = scan.topology;
     let new = fits_of(&scan.index(), scan.positions(), scan.radii(), looks, changed);
     let is_oriented = scan.meta.is_oriented;
-    let points = || changed.iter().flat_map(|leaf| topology.points_of_leaf(*leaf as usize));
-    for (i, mut fit) in points().zip(new) {
+    let points = changed.iter().flat_map(|leaf| topology.points_of_leaf(*leaf as usize));
+    for (i, mut fit) in points.zip(new) {
         // The normals of an oriented scan keep their side. Votes take over normals of the right side.
         if is_oriented && dot(fit.normal, scan.normals()[i]) < 0.0 {
             fit.normal = fit.normal.map(|c| -c);
@@ -273,15 +273,16 @@ fn fit(
         |i| known(scan, i),
         (blocks.len(), |k| blocks[k] as usize),
     );
-    for (i, fit) in corrected {
-        if memory.is_changed(i as usize / topology.leaf_size()) {
-            set(scan, i as usize, fit);
-        }
+    let is_open = |(i, _): &(u32, Fit)| memory.is_changed(*i as usize / topology.leaf_size());
+    let corrected: Vec<(u32, Fit)> = corrected.into_iter().filter(is_open).collect();
+    for (i, fit) in &corrected {
+        set(scan, *i as usize, *fit);
     }
-    let codes = codes_of(&scan.index(), scan.positions(), |i| known(scan, i), changed);
-    let all = scan.arrays.codes.to_mut();
-    for (i, code) in points().zip(codes) {
-        all[i] = code;
+    let again: Vec<u32> = corrected.iter().map(|(i, _)| *i).collect();
+    let gaps = gaps_of(&scan.index(), scan.positions(), |i| scan.normals()[i], &again);
+    let codes = scan.arrays.codes.to_mut();
+    for ((i, fit), gap) in corrected.iter().zip(gaps) {
+        codes[*i as usize] = PointCode::new(fit.kind(), gap);
     }
     for leaf in changed {
         if !is_oriented {
@@ -291,10 +292,10 @@ fn fit(
     }
 }
 
-/// Sets normal and class of a point, with no gap among its neighbours.
+/// Sets normal, class and gap of a point. An unknown gap is set to 0.
 fn set(scan: &mut PointHierarchy, i: usize, fit: Fit) {
     scan.arrays.normals.to_mut()[i] = fit.normal;
-    scan.arrays.codes.to_mut()[i] = PointCode::new(fit.kind(), 0);
+    scan.arrays.codes.to_mut()[i] = fit.point_code().0;
 }
 
 #[cfg(test)]
