@@ -20,7 +20,7 @@ use crate::eval::KernelName;
 use crate::mesh::args::MeshCollideArgs;
 use crate::path::PathLog;
 use crate::path_entry::{PathEntry, PathVerdict};
-use crate::penetration::{interiors, penetration_sentence};
+use crate::penetration::{self, interiors, penetration_sentence};
 use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PoseFile, Posed};
 use crate::units::SizeCheck;
@@ -183,9 +183,10 @@ impl Asked {
         let bounds = found.map(|found| [found.lower.max(gap).min(found.upper), found.upper]);
         let clearance = bounds.or(witness.map(|_| [0.0; 2]));
         let place = witness.or(found.map(|found| found.points[0]));
+        let penetration = self.penetration.as_ref().and_then(penetration::bounds);
         let (time, micros) = (self.time, self.micros);
         let (evidence, reason) = report.evidence_and_reason();
-        PathEntry { line, time, verdict, evidence, reason, clearance, place, micros }
+        PathEntry { line, time, verdict, evidence, reason, clearance, penetration, place, micros }
     }
 }
 
@@ -248,7 +249,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         let table = args.path.csv.as_deref().filter(|_| poses.is_some());
         output::replace_if_any(table, |csv| match &mut poses {
             Some(poses) => {
-                let log = Some(PathLog::new(&args.path, csv)?);
+                let log = Some(PathLog::new(&args.path, csv, args.penetration)?);
                 let mut out = Outputs { results: &mut results, proof, log };
                 answer_all(&question, poses, args, console, &mut out)?;
                 conclude(&question, args, &mut out)

@@ -156,7 +156,7 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
-            let mut log = PathLog::new(&args.path, csv)?;
+            let mut log = PathLog::new(&args.path, csv, false)?;
             let watch = poses.watch(console, &mut results);
             question.answer_all(poses, &mut log, &mut results)?;
             drop(watch);
@@ -202,7 +202,17 @@ impl Question<'_> {
             let verdict = if found.upper <= 0.0 { PathVerdict::Intersecting } else { PathVerdict::Separated };
             let (clearance, place) = (Some([found.lower, found.upper]), Some(found.points[0]));
             let (evidence, reason) = (Some(word(found.evidence)), None);
-            log.add(PathEntry { line, time, verdict, evidence, reason, clearance, place, micros })?;
+            log.add(PathEntry {
+                line,
+                time,
+                verdict,
+                evidence,
+                reason,
+                clearance,
+                penetration: None,
+                place,
+                micros,
+            })?;
         }
         Ok(())
     }

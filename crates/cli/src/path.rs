@@ -73,15 +73,37 @@ pub(crate) struct PathLog<'a> {
     least: Option<PathEntry>,
     /// The number of separated poses without a known clearance, and the line of the first one.
     unknown: (u64, u64),
+    /// `true` if the table has columns about penetrations.
+    has_penetrations: bool,
+    /// The number of poses with one thing inside the other.
+    nested: u64,
+    /// The pose with the greatest penetration.
+    deepest: Option<PathEntry>,
 }
 
 impl<'a> PathLog<'a> {
-    /// Starts a log that writes its table to `csv`.
-    pub(crate) fn new(args: &PathArgs, csv: Option<&'a mut (dyn Write + 'a)>) -> Result<Self, CliError> {
+    /// Starts a log that writes its table to `csv`, with penetrations if `has_penetrations`.
+    pub(crate) fn new(
+        args: &PathArgs,
+        csv: Option<&'a mut (dyn Write + 'a)>,
+        has_penetrations: bool,
+    ) -> Result<Self, CliError> {
         let csv = args.csv.clone().zip(csv);
         let kept = args.plot.is_some().then(Vec::new);
-        let mut log = Self { csv, kept, counts: [0; 3], first: None, least: None, unknown: (0, 0) };
-        log.write("line,time,verdict,evidence,reason,clearance_lower,clearance_upper,x,y,z,micros")?;
+        let mut log = Self {
+            csv,
+            kept,
+            counts: [0; 3],
+            first: None,
+            least: None,
+            unknown: (0, 0),
+            has_penetrations,
+            nested: 0,
+            deepest: None,
+        };
+        let columns = "line,time,verdict,evidence,reason,clearance_lower,clearance_upper,x,y,z,micros";
+        let more = if has_penetrations { ",penetration_lower,penetration_upper" } else { "" };
+        log.write(&format!("{columns}{more}"))?;
         Ok(log)
     }
 
@@ -94,18 +116,23 @@ impl<'a> PathLog<'a> {
 
     /// Adds the answer for the next pose.
     pub(crate) fn add(&mut self, entry: PathEntry) -> Result<(), CliError> {
-        self.write(&entry.row())?;
+        let more = if self.has_penetrations { entry.penetration_columns() } else { String::new() };
+        self.write(&format!("{}{more}", entry.row()))?;
         self.counts[entry.verdict as usize] += 1;
+        self.nested += u64::from(entry.is_nested());
+        let depth = |entry: &PathEntry| entry.penetration.map_or(0.0, |[_, upper]| upper);
+        if depth(&entry) > self.deepest.as_ref().map_or(0.0, depth) {
+            self.deepest = Some(entry);
+        }
         if entry.verdict == PathVerdict::Intersecting {
             self.first.get_or_insert(entry);
         }
         let upper = |entry: &PathEntry| entry.clearance.map_or(f64::INFINITY, |[_, upper]| upper);
-        if entry.verdict == PathVerdict::Separated
-            && upper(&entry) < self.least.as_ref().map_or(f64::INFINITY, upper)
-        {
+        let is_apart = entry.verdict == PathVerdict::Separated && !entry.is_nested();
+        if is_apart && upper(&entry) < self.least.as_ref().map_or(f64::INFINITY, upper) {
             self.least = Some(entry);
         }
-        if entry.verdict == PathVerdict::Separated && entry.clearance.is_none() {
+        if is_apart && entry.clearance.is_none() {
             let (count, first) = self.unknown;
             self.unknown = (count + 1, if count == 0 { entry.line } else { first });
         }
@@ -137,7 +164,8 @@ impl<'a> PathLog<'a> {
         };
         let counts = [
             (touching, format!("{verb}{}", first.unwrap_or_default())),
-            (apart, "apart".to_owned()),
+            (apart - self.nested, "apart".to_owned()),
+            (self.nested, "one inside the other".to_owned()),
             (unknown, "undecided".to_owned()),
         ];
         let counts = counts.into_iter().filter(|(n, _)| *n > 0);
@@ -146,6 +174,9 @@ impl<'a> PathLog<'a> {
         if let Some(PathEntry { clearance: Some(bounds), .. }) = &self.least {
             let where_found = self.least.as_ref().map(|least| least.where_found(unit)).unwrap_or_default();
             text += &format!(" Smallest clearance of those apart: {}, on {where_found}.", between(*bounds));
+        }
+        if let Some(PathEntry { penetration: Some([_, upper]), line, .. }) = &self.deepest {
+            text += &format!(" Deepest: moving b by {} separates them, on line {line}.", short(*upper));
         }
         if let (unknown @ 1.., line) = self.unknown {
             text += &format!(

@@ -13,6 +13,8 @@ pub(crate) struct PathEntry {
     pub(crate) reason: Option<&'static str>,
     /// Bounds of the distance, lower and upper, in world units.
     pub(crate) clearance: Option<[f64; 2]>,
+    /// Bounds of the penetration, lower and upper, if it was asked for and the things overlap.
+    pub(crate) penetration: Option<[f64; 2]>,
     /// The witness of a contact, or else the nearest point on a.
     pub(crate) place: Option<[f64; 3]>,
     pub(crate) micros: f64,
@@ -44,7 +46,17 @@ impl PathEntry {
         format!("line {}{time}{at}", self.line)
     }
 
-    /// Returns the row of the table; unknown values are empty.
+    /// Returns `true` if the surfaces are separate, and one is inside the other, which is solid.
+    pub(crate) fn is_nested(&self) -> bool {
+        self.verdict == PathVerdict::Separated && self.penetration.is_some()
+    }
+
+    /// Returns the columns about the penetration; empty if there is none.
+    pub(crate) fn penetration_columns(&self) -> String {
+        self.penetration.map_or(",,".to_owned(), |[lower, upper]| format!(",{lower},{upper}"))
+    }
+
+    /// Returns the other columns of the table; unknown values are empty.
     pub(crate) fn row(&self) -> String {
         let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
         let [lower, upper] = [0, 1].map(|k| number(self.clearance.map(|bounds| bounds[k])));

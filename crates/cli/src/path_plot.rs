@@ -294,7 +294,17 @@ mod tests {
 
     fn entry(line: u64, verdict: PathVerdict, clearance: Option<[f64; 2]>) -> PathEntry {
         let time = None;
-        PathEntry { line, time, verdict, evidence: None, reason: None, clearance, place: None, micros: 1.0 }
+        PathEntry {
+            line,
+            time,
+            verdict,
+            evidence: None,
+            reason: None,
+            clearance,
+            penetration: None,
+            place: None,
+            micros: 1.0,
+        }
     }
 
     #[test]

@@ -56,6 +56,11 @@ fn overlaps(found: &Penetration) -> bool {
     found.upper > 0.0 && found.upper.is_finite()
 }
 
+/// Returns both bounds; `None` for things that are separate, and for invalid poses.
+pub(crate) fn bounds(found: &Penetration) -> Option<[f64; 2]> {
+    overlaps(found).then_some([found.lower, found.upper])
+}
+
 /// Returns the penetration as a sentence: `moved` is moved away `from` another thing; `None` for things
 /// that are separate, and for invalid poses. The lower bound is rounded down, the upper one up.
 pub(crate) fn penetration_sentence(

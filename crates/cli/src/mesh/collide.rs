@@ -17,7 +17,7 @@ use crate::error::CliError;
 use crate::output;
 use crate::path::PathLog;
 use crate::path_entry::PathEntry;
-use crate::penetration::penetration_sentence;
+use crate::penetration::{self, penetration_sentence};
 use crate::picture::{Style, check_name, names};
 use crate::pose_batch::{PoseLine, answer_lines};
 use crate::posing::{self, PoseFile, Posed};
@@ -66,6 +66,7 @@ impl Asked {
             evidence,
             reason,
             clearance: bounds.or(witness.map(|_| [0.0; 2])),
+            penetration: self.penetration.as_ref().and_then(penetration::bounds),
             place: witness.or(self.clearance.map(|found| found.points[0])),
             micros: self.micros,
         }
@@ -89,7 +90,7 @@ pub(crate) fn run(args: &MeshCollideArgs) -> Result<(), CliError> {
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
-            let mut log = PathLog::new(&args.path, csv)?;
+            let mut log = PathLog::new(&args.path, csv, args.penetration)?;
             question.answer_all(poses, console, &mut log, &mut results)?;
             log.draw(&args.path, &names(args.pair.inputs()), 0.0)?;
             let unit = question.meshes.unit(&[Pose::IDENTITY; 2]);

@@ -38,7 +38,7 @@ impl DistanceQuestion<'_> {
         let mut results = Results::new();
         match &mut poses {
             Some(poses) => output::replace_if_any(self.path.csv.as_deref(), |csv| {
-                let mut log = PathLog::new(self.path, csv)?;
+                let mut log = PathLog::new(self.path, csv, false)?;
                 let watch = poses.watch(console, &mut results);
                 self.answer_all(&meshes, poses, &mut log, &mut results)?;
                 drop(watch);
@@ -119,6 +119,7 @@ fn entry(found: &MeshDistance, line: u64, time: Option<f64>, micros: f64) -> Pat
         evidence: reason.is_none().then_some("certified"),
         reason,
         clearance: is_known.then_some([found.lower, found.upper]),
+        penetration: None,
         place: is_known.then_some(found.points[0]),
         micros,
     }
