@@ -124,7 +124,7 @@ impl<'a> Arm<'a> {
         }
     }
 
-    /// The body of the room or of a link: `None` for the room.
+    /// Returns the part of a link with this body; `None` for the room.
     fn part(&self, id: BodyId) -> Option<&Part> {
         self.parts.iter().find(|part| part.id == id)
     }
@@ -176,7 +176,7 @@ impl<'a> Arm<'a> {
         })
     }
 
-    /// What a body is, for people.
+    /// Returns the name of a body, for people.
     pub(crate) fn name(&self, id: BodyId) -> String {
         match self.part(id) {
             None => "the room".into(),
