@@ -62,7 +62,8 @@ impl Question {
         let penetration = self.interiors.and_then(|interiors| {
             views.penetration(&self.plan, interiors, &self.budget_from(now()), scratch)
         });
-        Asked { line, time, poses, answer, clearance, penetration, wanted, micros }
+        let has_solid = self.interiors.is_some_and(|interiors| interiors.contains(&Interior::Solid));
+        Asked { line, time, poses, answer, clearance, penetration, has_solid, wanted, micros }
     }
 
     /// Returns the budget of a query that starts at `start`.
@@ -150,6 +151,8 @@ struct Asked {
     clearance: Option<Distance>,
     /// The penetration, if it is wanted.
     penetration: Option<Penetration>,
+    /// `true` if the inside of a scan counts for it.
+    has_solid: bool,
     wanted: Wanted,
     micros: f64,
 }
@@ -159,11 +162,20 @@ impl Asked {
         self.answer.verdict.is_intersecting()
     }
 
+    /// Returns `true` if the surfaces are separate and one is inside the other, which is solid. A method that
+    /// only estimates may have missed a contact.
+    fn is_nested(&self, found: &Penetration) -> bool {
+        let has_missed = self.clearance.is_some_and(|clearance| clearance.upper <= 0.0);
+        self.has_solid
+            && self.answer.verdict.is_separated()
+            && !has_missed
+            && penetration::bounds(found).is_some()
+    }
+
     /// Returns the penetration as a sentence.
     fn way_out(&self, found: &Penetration, unit: f64) -> Option<String> {
         let sentence = penetration_sentence(found, ["b", "them"], unit)?;
-        let is_nested = self.answer.verdict.is_separated();
-        Some(if is_nested {
+        Some(if self.is_nested(found) {
             format!("One is inside the other, which is solid. {sentence}")
         } else {
             sentence
@@ -184,9 +196,10 @@ impl Asked {
         let clearance = bounds.or(witness.map(|_| [0.0; 2]));
         let place = witness.or(found.map(|found| found.points[0]));
         let penetration = self.penetration.as_ref().and_then(penetration::bounds);
+        let is_nested = self.penetration.as_ref().is_some_and(|found| self.is_nested(found));
         let (time, micros) = (self.time, self.micros);
         let (evidence, reason) = report.evidence_and_reason();
-        PathEntry { line, time, verdict, evidence, reason, clearance, penetration, place, micros }
+        PathEntry { line, time, verdict, evidence, reason, clearance, penetration, is_nested, place, micros }
     }
 }
 

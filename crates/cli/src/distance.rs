@@ -210,6 +210,7 @@ impl Question<'_> {
                 reason,
                 clearance,
                 penetration: None,
+                is_nested: false,
                 place,
                 micros,
             })?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::digits::{count, short};
+use crate::digits::{count, rounded, short};
 use crate::error::CliError;
 use crate::output;
 use crate::path_entry::{PathEntry, PathVerdict};
@@ -77,7 +77,7 @@ pub(crate) struct PathLog<'a> {
     has_penetrations: bool,
     /// The number of poses with one thing inside the other.
     nested: u64,
-    /// The pose with the greatest penetration.
+    /// The pose with the greatest upper bound of the penetration.
     deepest: Option<PathEntry>,
 }
 
@@ -119,7 +119,7 @@ impl<'a> PathLog<'a> {
         let more = if self.has_penetrations { entry.penetration_columns() } else { String::new() };
         self.write(&format!("{}{more}", entry.row()))?;
         self.counts[entry.verdict as usize] += 1;
-        self.nested += u64::from(entry.is_nested());
+        self.nested += u64::from(entry.is_nested);
         let depth = |entry: &PathEntry| entry.penetration.map_or(0.0, |[_, upper]| upper);
         if depth(&entry) > self.deepest.as_ref().map_or(0.0, depth) {
             self.deepest = Some(entry);
@@ -128,7 +128,7 @@ impl<'a> PathLog<'a> {
             self.first.get_or_insert(entry);
         }
         let upper = |entry: &PathEntry| entry.clearance.map_or(f64::INFINITY, |[_, upper]| upper);
-        let is_apart = entry.verdict == PathVerdict::Separated && !entry.is_nested();
+        let is_apart = entry.verdict == PathVerdict::Separated && !entry.is_nested;
         if is_apart && upper(&entry) < self.least.as_ref().map_or(f64::INFINITY, upper) {
             self.least = Some(entry);
         }
@@ -165,7 +165,7 @@ impl<'a> PathLog<'a> {
         let counts = [
             (touching, format!("{verb}{}", first.unwrap_or_default())),
             (apart - self.nested, "apart".to_owned()),
-            (self.nested, "one inside the other".to_owned()),
+            (self.nested, "with one inside the other".to_owned()),
             (unknown, "undecided".to_owned()),
         ];
         let counts = counts.into_iter().filter(|(n, _)| *n > 0);
@@ -176,7 +176,8 @@ impl<'a> PathLog<'a> {
             text += &format!(" Smallest clearance of those apart: {}, on {where_found}.", between(*bounds));
         }
         if let Some(PathEntry { penetration: Some([_, upper]), line, .. }) = &self.deepest {
-            text += &format!(" Deepest: moving b by {} separates them, on line {line}.", short(*upper));
+            let upper = rounded(upper + 0.5 * unit, unit);
+            text += &format!(" Greatest way out: moving b by {upper} separates them, on line {line}.");
         }
         if let (unknown @ 1.., line) = self.unknown {
             text += &format!(

@@ -15,6 +15,8 @@ pub(crate) struct PathEntry {
     pub(crate) clearance: Option<[f64; 2]>,
     /// Bounds of the penetration, lower and upper, if it was asked for and the things overlap.
     pub(crate) penetration: Option<[f64; 2]>,
+    /// `true` if the surfaces are separate, and one is inside the other, which is solid.
+    pub(crate) is_nested: bool,
     /// The witness of a contact, or else the nearest point on a.
     pub(crate) place: Option<[f64; 3]>,
     pub(crate) micros: f64,
@@ -44,11 +46,6 @@ impl PathEntry {
         let time = self.time.map_or(String::new(), |time| format!(", time {time}"));
         let at = self.place.map_or(String::new(), |at| format!(", at {}", place(at, unit)));
         format!("line {}{time}{at}", self.line)
-    }
-
-    /// Returns `true` if the surfaces are separate, and one is inside the other, which is solid.
-    pub(crate) fn is_nested(&self) -> bool {
-        self.verdict == PathVerdict::Separated && self.penetration.is_some()
     }
 
     /// Returns the columns about the penetration; empty if there is none.

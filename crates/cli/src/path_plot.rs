@@ -302,6 +302,7 @@ mod tests {
             reason: None,
             clearance,
             penetration: None,
+            is_nested: false,
             place: None,
             micros: 1.0,
         }

@@ -67,6 +67,8 @@ impl Asked {
             reason,
             clearance: bounds.or(witness.map(|_| [0.0; 2])),
             penetration: self.penetration.as_ref().and_then(penetration::bounds),
+            // The triangles of nested meshes are separate.
+            is_nested: self.penetration.as_ref().and_then(penetration::bounds).is_some() && witness.is_none(),
             place: witness.or(self.clearance.map(|found| found.points[0])),
             micros: self.micros,
         }

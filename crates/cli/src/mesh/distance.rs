@@ -120,6 +120,7 @@ fn entry(found: &MeshDistance, line: u64, time: Option<f64>, micros: f64) -> Pat
         reason,
         clearance: is_known.then_some([found.lower, found.upper]),
         penetration: None,
+        is_nested: false,
         place: is_known.then_some(found.points[0]),
         micros,
     }

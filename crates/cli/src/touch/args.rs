@@ -54,7 +54,7 @@ pub struct TouchArgs {
     pub solid: bool,
     /// Time limit for the penetration of each shape, such as 2ms; for --penetration
     ///
-    /// The unit is ns, us, ms or s. When time runs out, both bounds hold, but are less tight.
+    /// The unit is ns, us, ms or s. When time runs out, both bounds still hold, but are less tight.
     #[arg(long, value_name = "2ms", requires = "penetration", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
     /// Work limit for the penetration of each shape; reproducible, unlike time

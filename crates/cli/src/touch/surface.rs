@@ -56,9 +56,7 @@ impl Asked {
             work: args.work,
         }))
     }
-}
 
-impl Asked {
     /// Returns the budget of a penetration that starts now.
     fn budget(&self) -> Budget {
         let mut budget = Budget::UNLIMITED;

@@ -179,3 +179,17 @@ fn a_path_is_summed_up_tabled_and_drawn() {
     let refused = ["collide", "ball.nm", "ball.nm", "--poses", "path.tum", "--plot", "t.png"];
     place.refused(2, &refused, &["--plot: expected a name that ends in .svg, got `t.png`"]);
 }
+
+#[test]
+fn a_small_ball_inside_a_solid_one_is_not_apart() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    // A small ball within a large one, which is solid.
+    place.cloud("small.xyz", sphere(0.3), 0.02);
+    place.write("poses.txt", "0 0 0 0 0 0 1\n3 0 0 0 0 0 1\n");
+    let nested = ["collide", "ball.xyz", "small.xyz", "--poses", "poses.txt", "--penetration", "--quiet"];
+    let told = place.ok(&[&nested[..], &["--solid", "a"]].concat()).results;
+    assert!(told.contains("2 poses: 1 apart, 1 with one inside the other."), "{told}");
+    let told = place.ok(&nested).results;
+    assert!(told.contains("2 poses: 2 apart."), "{told}");
+}

@@ -80,9 +80,10 @@ impl Parts<'_> {
     }
 }
 
-/// Replaces the box of each node with a leaf that is `changed` by one along its axes about the discs and
-/// balls of the node's points, with their greatest radius, and sets its growths to the enclosures of the
-/// surface and of the obstacle. The surface is within `beyond` of the points. O(n).
+/// Replaces the box of each node above a `changed` leaf by one along its axes about the discs and balls
+/// of the node's points, with their greatest radius, and sets its growths to the enclosures of the
+/// surface and of the obstacle. The surface is within `beyond` of the points. O(n), and O(n log n) tests of
+/// `changed`.
 ///
 /// The box of a node with at most four leaves is the smallest one. That of any other node is the
 /// smallest one about the boxes of the nodes with four leaves under it, which are small beside it.

@@ -57,6 +57,11 @@ impl Fit {
         Self { normal, code: kind.code().into() }
     }
 
+    /// Returns the fit with its normal on the other side.
+    pub(crate) fn flipped(self) -> Self {
+        Self { normal: self.normal.map(|c| -c), ..self }
+    }
+
     /// Returns the code of the point, and `false` if its gap is unknown and taken for 0.
     pub(crate) fn point_code(&self) -> (PointCode, bool) {
         let gap = self.code >> GAP;

@@ -255,13 +255,14 @@ fn fit(
     let topology = scan.topology;
     let new = fits_of(&scan.index(), scan.positions(), scan.radii(), looks, changed);
     let is_oriented = scan.meta.is_oriented;
-    let points = changed.iter().flat_map(|leaf| topology.points_of_leaf(*leaf as usize));
-    for (i, mut fit) in points.zip(new) {
-        // The normals of an oriented scan keep their side. Votes take over normals of the right side.
-        if is_oriented && dot(fit.normal, scan.normals()[i]) < 0.0 {
-            fit.normal = fit.normal.map(|c| -c);
-        }
-        set(scan, i, fit);
+    // The normals of an oriented scan keep their side.
+    let sided = |fit: Fit, before: [f32; 3]| {
+        if is_oriented && dot(fit.normal, before) < 0.0 { fit.flipped() } else { fit }
+    };
+    let points = || changed.iter().flat_map(|leaf| topology.points_of_leaf(*leaf as usize));
+    let carried: Vec<[f32; 3]> = points().map(|i| scan.normals()[i]).collect();
+    for ((i, fit), before) in points().zip(new).zip(&carried) {
+        set(scan, i, sided(fit, *before));
     }
     let tree = boxes.over(&scan.arrays.blocks);
     let known =
@@ -276,7 +277,11 @@ fn fit(
     let is_open = |(i, _): &(u32, Fit)| memory.is_changed(*i as usize / topology.leaf_size());
     let corrected: Vec<(u32, Fit)> = corrected.into_iter().filter(is_open).collect();
     for (i, fit) in &corrected {
-        set(scan, *i as usize, *fit);
+        // All leaves before the last one are full.
+        let (leaf, place) = (*i as usize / topology.leaf_size(), *i as usize % topology.leaf_size());
+        let before =
+            changed.partition_point(|changed| (*changed as usize) < leaf) * topology.leaf_size() + place;
+        set(scan, *i as usize, sided(*fit, carried[before]));
     }
     let again: Vec<u32> = corrected.iter().map(|(i, _)| *i).collect();
     let gaps = gaps_of(&scan.index(), scan.positions(), |i| scan.normals()[i], &again);
@@ -306,13 +311,14 @@ mod tests {
     use crate::scan::options::BuildOptions;
 
     /// Moves a sheet of points. One corner of it folds, so its leaves are fitted anew.
-    fn folded() -> (PointHierarchy, Memory, Refitted) {
+    fn folded(leaf_size: u32) -> (PointHierarchy, Memory, Refitted) {
         let sheet = |fold: f64| -> Vec<[f64; 3]> {
             let lattice = (0..3_600_u32).map(|i| [f64::from(i % 60), f64::from(i / 60)]);
             lattice.map(|[x, y]| [x, y, 0.002 * x * x + fold * (x + y - 90.0).max(0.0)]).collect()
         };
         let cloud = PointCloud::from_positions(&sheet(0.0)).unwrap();
-        let mut scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let mut scan =
+            PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(leaf_size)).unwrap();
         let (mut memory, points) = (Memory::at_rest(), sheet(1.0));
         let bounds = Aabb::of(points.iter().copied());
         let placed = NextFrame { points: &points, frame: *scan.frame(), bounds, step: scan.meta.step };
@@ -322,8 +328,6 @@ mod tests {
 
     #[test]
     fn bounds_above_changed_leaves_are_those_of_all_nodes_computed_anew() {
-        let (mut scan, mut memory, refitted) = folded();
-        assert!(refitted.fitted > 100 && refitted.carried > 2_000, "{refitted:?}");
         let bounds = |scan: &PointHierarchy| {
             let arrays = &scan.arrays;
             let bytes: [&[u8]; 4] = [
@@ -334,8 +338,13 @@ mod tests {
             ];
             bytes.map(<[u8]>::to_vec)
         };
-        let partial = bounds(&scan);
-        memory.closing.bound(&mut scan);
-        assert!(partial == bounds(&scan));
+        // Blocks straddle leaves of other sizes than 16.
+        for leaf_size in [10, 16, 24] {
+            let (mut scan, mut memory, refitted) = folded(leaf_size);
+            assert!(refitted.fitted > 100 && refitted.carried > 2_000, "{refitted:?}");
+            let partial = bounds(&scan);
+            memory.closing.bound(&mut scan);
+            assert!(partial == bounds(&scan), "leaves of {leaf_size}");
+        }
     }
 }

@@ -18,8 +18,9 @@ const RADIUS: f64 = 0.03;
 /// The length of a tool in the hand.
 const TOOL: f64 = 0.12;
 
-/// The greatest clearance that is proven. Pairs further apart need no distance query.
-const CLEARANCE: f64 = 0.05;
+/// The greatest clearance that is proven, as a share of the length of the arm. Pairs further apart need no
+/// distance query.
+pub(crate) const CLEARANCE: f64 = 0.05;
 
 /// Intervals shorter than this are not split.
 const SHORTEST: f64 = 1e-4;
@@ -29,6 +30,7 @@ const SHORTEST: f64 = 1e-4;
 struct Part {
     id: BodyId,
     link: usize,
+    is_tool: bool,
     /// The body's pose in the frame of the link.
     offset: Pose,
     /// The greatest distance of the body from the joint of its link.
@@ -77,6 +79,7 @@ impl<'a> Arm<'a> {
             .map(|link| Part {
                 id: world.insert_shape(capsule(link, length), &Pose::IDENTITY),
                 link,
+                is_tool: false,
                 offset: Pose::IDENTITY,
                 reach: (LENGTHS[link] + RADIUS) * length,
             })
@@ -88,11 +91,12 @@ impl<'a> Arm<'a> {
             let shrunk = Pose::IDENTITY.with_scale(TOOL * length / size);
             let (from, ahead) = (shrunk.apply(bounds.centre()), (LENGTHS[LINKS - 1] + 0.5 * TOOL) * length);
             let offset = shrunk.with_translation([ahead - from[0], -from[1], -from[2]]);
+            let id = world.insert(tool, &offset);
+            // The box of the surface, whose joint is now at the origin.
+            let corners = world.bounds(id).map_or([[f64::INFINITY; 3]; 8], |bounds| bounds.corners());
             let norm = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let reach = bounds.corners().map(|corner| norm(offset.apply(corner))).into_iter();
-            // Discs at the points reach a little further.
-            let reach = reach.fold(0.0, f64::max) + 4.0 * offset.scale() * tool.reach();
-            parts.push(Part { id: world.insert(tool, &offset), link: LINKS - 1, offset, reach });
+            let reach = corners.into_iter().map(norm).fold(0.0, f64::max);
+            parts.push(Part { id, link: LINKS - 1, is_tool: true, offset, reach });
         }
         Self { world, room, parts, base, length, plan }
     }
@@ -129,10 +133,11 @@ impl<'a> Arm<'a> {
         self.parts.iter().find(|part| part.id == id)
     }
 
-    /// Tells whether a pair of bodies matters: a link and the room, or two links that are no neighbours.
+    /// Tells whether a pair of bodies matters: a link and the room, or two links that are no neighbours. The
+    /// tool is no neighbour of the link before its own.
     fn counts(&self, a: BodyId, b: BodyId) -> bool {
         match (self.part(a), self.part(b)) {
-            (Some(a), Some(b)) => a.link.abs_diff(b.link) > 1,
+            (Some(a), Some(b)) => a.link.abs_diff(b.link) > usize::from(!a.is_tool && !b.is_tool),
             _ => true,
         }
     }
@@ -180,8 +185,8 @@ impl<'a> Arm<'a> {
     pub(crate) fn name(&self, id: BodyId) -> String {
         match self.part(id) {
             None => "the room".into(),
-            Some(part) if part.offset == Pose::IDENTITY => format!("link {}", part.link),
-            Some(_) => "the tool".into(),
+            Some(part) if part.is_tool => "the tool".into(),
+            Some(part) => format!("link {}", part.link),
         }
     }
 }

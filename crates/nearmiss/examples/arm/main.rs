@@ -12,7 +12,7 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
-use arm::{Angles, Arm, between, prove};
+use arm::{Angles, Arm, CLEARANCE, between, prove};
 use drawing::Moment;
 use nearmiss::{
     BuildOptions, Check, CollideOptions, DistanceOptions, DistancePlan, NearestPair, PointCloud, Pose, Scan,
@@ -69,7 +69,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     println!("{} legs proven free, {refused} refused; {intervals} intervals in the proof", path.len() - 1);
-    println!("all pairs keep more than {clearance:.2e}, proven");
+    if clearance.is_finite() {
+        let most = CLEARANCE * length;
+        println!("all pairs keep at least {clearance:.2e}, proven (up to {most:.3} is looked for)");
+    }
 
     let mut moments = Vec::new();
     let mut nearest: [Option<NearestPair>; 2] = [None; 2];
