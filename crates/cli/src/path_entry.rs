@@ -48,7 +48,8 @@ impl PathEntry {
         format!("line {}{time}{at}", self.line)
     }
 
-    /// Returns the columns about the penetration; empty if there is none.
+    /// Returns the two columns of the penetration, with a comma before each. They are empty without a
+    /// penetration.
     pub(crate) fn penetration_columns(&self) -> String {
         self.penetration.map_or(",,".to_owned(), |[lower, upper]| format!(",{lower},{upper}"))
     }
