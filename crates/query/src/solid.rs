@@ -21,6 +21,7 @@ pub(crate) mod placed;
 pub(crate) mod plan;
 pub(crate) mod ray;
 pub(crate) mod ray_lanes;
+pub(crate) mod reach;
 pub(crate) mod refine;
 pub(crate) mod scratch;
 pub(crate) mod shape;

@@ -39,6 +39,8 @@ impl FlatDisc {
     #[inline]
     pub(crate) fn rim(&self, d: &Vector3<f64>) -> Vector3<f64> {
         let across = d - self.normal * self.normal.dot(d);
+        // Again, as rounding of the first may be as large as what it leaves.
+        let across = across - self.normal * self.normal.dot(&across);
         let square = across.norm_squared();
         // Along the normal all points are equal.
         if square > 1e-24 * d.norm_squared() {

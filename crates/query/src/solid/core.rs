@@ -164,6 +164,11 @@ impl<'a> Solid<'a> {
         matches!(self.core, Core::Point)
     }
 
+    /// Returns `true` if the nearest point of the core is known without an iteration.
+    pub(crate) fn has_projection(&self) -> bool {
+        !matches!(self.core, Core::Hull(..) | Core::Own(..))
+    }
+
     /// Returns `true` if the core is a point or a segment along the first axis.
     pub(crate) fn is_segment(&self) -> bool {
         matches!(self.core, Core::Point | Core::Segment)

@@ -224,6 +224,16 @@ impl<'a> Elements<'a> {
         is_held.then_some(point)
     }
 
+    /// A point of the disc or ball of a point that is in a shape or within the margin, if there is one.
+    pub(crate) fn reached(&self, solid: &Solid<'_>, i: usize) -> Option<Vector> {
+        let Element::Disc(disc) = self.element(i) else {
+            let (gap, _) = self.gap(solid, i, self.margin);
+            return if gap.distance > solid.radius + self.margin { None } else { Some(gap.on_disc) };
+        };
+        let thick = f64::from(THICKNESS) * disc.radius;
+        solid.reaches(&disc, solid.radius + self.margin.max(thick))
+    }
+
     /// The nearest points of a core and the part of a point, less its ball. Also the distance up to
     /// which they meet without a margin. If the shape is further away than `most` and than that, any
     /// distance that exceeds both.

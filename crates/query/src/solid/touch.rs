@@ -114,15 +114,12 @@ impl Touch<'_, '_> {
     /// Compares the shape with the part of a point.
     fn compare(&mut self, i: usize) -> ControlFlow<()> {
         let Near { elements, solid, .. } = self.near;
-        let (gap, thick) = elements.gap(solid, i, elements.margin);
-        if gap.distance > solid.radius + elements.margin.max(thick) {
-            return ControlFlow::Continue(());
-        }
+        let Some(point) = elements.reached(solid, i) else { return ControlFlow::Continue(()) };
         if elements.is_doubtful(i) {
             self.undersampled = true;
             return ControlFlow::Continue(());
         }
-        let met = Met { i, point: gap.on_disc };
+        let met = Met { i, point };
         if !elements.is_disc(i) {
             self.certified = Some(met);
             return ControlFlow::Break(());
