@@ -117,8 +117,9 @@ impl FlatDisc {
         const ROUNDS: u32 = 80;
         /// Rounds after which every other one is a bisection.
         const QUICK: u32 = 8;
-        /// In disc radii. The error of a distance is of second order in that of the place.
-        const PRECISION: f64 = 1e-9;
+        /// The last change, in disc radii. What a step of Newton's method leaves is of second order in its
+        /// length, and the error of a distance is of second order in that of the place.
+        const PRECISION: f64 = 1e-5;
         let square = way.norm_squared();
         // Also if the edge is a point.
         let per_radius = (self.radius / square.sqrt()).min(2.0);

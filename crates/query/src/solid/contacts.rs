@@ -291,22 +291,23 @@ impl Selection<'_, '_> {
         self.count += 1;
         #[expect(clippy::cast_possible_truncation, reason = "as precise as the positions")]
         let at = [0, 1, 2].map(|k| met.at[k] as f32);
-        let (mut kept, mut greatest) = (0, 0);
         (self.next, self.is_ordered) = (None, false);
-        self.found.retain_mut(|other| {
+        let (mut kept, mut greatest, mut next) = (0, 0, 0);
+        // Without branches, as it is not predictable which candidates are kept.
+        for n in 0..self.found.len() {
+            let mut other = self.found[n];
             let [x, y, z] = [other.centre[0] - at[0], other.centre[1] - at[1], other.centre[2] - at[2]];
             other.away_sq = other.away_sq.min(x * x + y * y + z * z);
-            let is_apart = other.away_sq >= other.apart_sq && other.i as usize != met.i;
-            let is_kept = is_apart && other.known != Known::Unusable;
-            if is_kept {
-                let key = other.key(other.away_sq);
-                if key > greatest {
-                    (greatest, self.next) = (key, Some(kept));
-                }
-                kept += 1;
-            }
-            is_kept
-        });
+            let is_apart = (other.away_sq >= other.apart_sq) & (other.i as usize != met.i);
+            let is_kept = is_apart & (other.known != Known::Unusable);
+            self.found[kept] = other;
+            let key = if is_kept { other.key(other.away_sq) } else { 0 };
+            next = if key > greatest { kept } else { next };
+            greatest = greatest.max(key);
+            kept += usize::from(is_kept);
+        }
+        self.found.truncate(kept);
+        self.next = (greatest > 0).then_some(next);
     }
 }
 
