@@ -2,8 +2,8 @@
 
 use nearmiss::{
     Answer, Budget, CollideOptions, CollidePlan, Contact, Contacts, Distance, DistanceOptions, DistancePlan,
-    Interior, ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, Pair, Penetration, Placed, PlacedMesh,
-    PlanError, Pose, Proof, Scan, Scratch, Semantics,
+    Interior, ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, MeshSolid, Pair, Penetration, Placed,
+    PlacedMesh, PlanError, Pose, Proof, Scan, Scratch, Semantics,
 };
 
 use crate::contacts::{ContactArgs, Grouped};
@@ -28,6 +28,23 @@ pub(crate) enum Bodies {
 pub(crate) enum Plan {
     Scans(CollidePlan),
     MeshAndScan(MeshScanPlan),
+}
+
+/// The insides of bodies, for their penetration.
+#[derive(Debug)]
+pub(crate) enum Insides {
+    Scans([Interior; 2]),
+    MeshAndScan(MeshSolid, Interior),
+}
+
+impl Insides {
+    /// Returns `true` if one of the bodies encloses a solid.
+    pub(crate) fn has_solid(&self) -> bool {
+        match self {
+            Self::Scans(interiors) => interiors.contains(&Interior::Solid),
+            Self::MeshAndScan(solid, interior) => solid.is_closed() || *interior == Interior::Solid,
+        }
+    }
 }
 
 impl Plan {
@@ -70,6 +87,16 @@ impl Bodies {
             Self::Scans([a, b]) => [a, b],
             Self::MeshAndScan { mesh, scan, mesh_is_a: true } => [mesh, scan],
             Self::MeshAndScan { mesh, scan, mesh_is_a: false } => [scan, mesh],
+        }
+    }
+
+    /// Returns the insides of the bodies: those of scans as given, that of a mesh by its closed parts.
+    pub(crate) fn insides(&self, interiors: [Interior; 2]) -> Insides {
+        match self {
+            Self::Scans(_) => Insides::Scans(interiors),
+            Self::MeshAndScan { mesh, mesh_is_a, .. } => {
+                Insides::MeshAndScan(MeshSolid::new(mesh), interiors[usize::from(*mesh_is_a)])
+            }
         }
     }
 
@@ -176,17 +203,31 @@ impl<'a> Views<'a> {
         }
     }
 
-    /// Bounds the penetration of two scans with these insides; `None` for a mesh and a scan.
+    /// Bounds the penetration with these insides, which are those of the same bodies. The direction is that
+    /// in which b moves.
     pub(crate) fn penetration(
         &self,
         plan: &Plan,
-        interiors: [Interior; 2],
+        insides: &Insides,
         budget: &Budget,
         scratch: &mut Scratch,
     ) -> Option<Penetration> {
-        match (self, plan) {
-            (Self::Scans([a, b]), Plan::Scans(plan)) => {
-                Some(Pair::new(*a, *b).within(budget).penetration(plan, interiors, scratch))
+        match (self, plan, insides) {
+            (Self::Scans([a, b]), Plan::Scans(plan), Insides::Scans(interiors)) => {
+                Some(Pair::new(*a, *b).within(budget).penetration(plan, *interiors, scratch))
+            }
+            (
+                Self::MeshAndScan { mesh, scan, mesh_is_a },
+                Plan::MeshAndScan(plan),
+                Insides::MeshAndScan(solid, interior),
+            ) => {
+                let pair = MeshScanPair::new(*scan, *mesh).within(budget);
+                let mut found = pair.penetration(plan, (*interior, solid), scratch);
+                if *mesh_is_a {
+                    // The scan moves the other way.
+                    found.direction = found.direction.map(|x| 0.0 - x);
+                }
+                Some(found)
             }
             _ => None,
         }

@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use nearmiss::{
     Answer, Budget, CollideOptions, Contacts, Deadline, Detail, Distance, DistanceOptions, DistancePlan,
-    Evidence, Interior, Metric, Penetration, Pose, Proof, Scan, Scratch, Verdict,
+    Evidence, Metric, Penetration, Pose, Proof, Scan, Scratch, Verdict,
 };
 
 use crate::answer_report::AnswerReport;
 use crate::as_mesh::AsMeshName;
-use crate::bodies::{Bodies, Plan, Wanted};
+use crate::bodies::{Bodies, Insides, Plan, Wanted};
 use crate::collide_args::{CollideArgs, DetailName, EvidenceName};
 use crate::console::{self, Console, Results, now};
 use crate::distance_picture::paint_apart;
@@ -36,8 +36,8 @@ struct Question {
     prove: bool,
     all: bool,
     manifold: bool,
-    /// The insides of the scans, if the penetration is wanted.
-    interiors: Option<[Interior; 2]>,
+    /// The insides of the bodies, if the penetration is wanted.
+    insides: Option<Insides>,
     /// The plan of distance queries for the clearance along a path, if it is needed.
     clearance: Option<DistancePlan>,
     sizes: SizeCheck,
@@ -59,10 +59,11 @@ impl Question {
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
         let clearance = self.clearance.as_ref().filter(|_| needs_clearance(&answer, self.plan.options()));
         let clearance = clearance.map(|plan| views.distance(plan, &self.budget_from(now()), scratch));
-        let penetration = self.interiors.and_then(|interiors| {
-            views.penetration(&self.plan, interiors, &self.budget_from(now()), scratch)
-        });
-        let has_solid = self.interiors.is_some_and(|interiors| interiors.contains(&Interior::Solid));
+        let penetration = self
+            .insides
+            .as_ref()
+            .and_then(|insides| views.penetration(&self.plan, insides, &self.budget_from(now()), scratch));
+        let has_solid = self.insides.as_ref().is_some_and(Insides::has_solid);
         Asked { line, time, poses, answer, clearance, penetration, has_solid, wanted, micros }
     }
 
@@ -241,7 +242,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let wants_clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
     let distance = DistanceOptions::default().with_semantics(plan.options().semantics);
     let clearance = wants_clearance.then(|| bodies.distance_plan(&distance)).transpose()?;
-    let interiors = args.penetration.then(|| interiors(args.solid));
+    let insides = args.penetration.then(|| bodies.insides(interiors(args.solid)));
     let question = Question {
         bodies,
         plan,
@@ -251,7 +252,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         prove,
         all: args.all,
         manifold,
-        interiors,
+        insides,
         clearance,
         sizes,
     };

@@ -1,4 +1,4 @@
-//! Queries of a mesh and a scan: collision, all contacts, distance.
+//! Queries of a mesh and a scan: collision, all contacts, distance, penetration.
 
 pub(crate) mod collide;
 pub(crate) mod course;
@@ -8,6 +8,7 @@ pub(crate) mod leaves;
 pub(crate) mod mesh_scan_pair;
 pub(crate) mod pair;
 pub(crate) mod pairing;
+pub(crate) mod penetration;
 pub(crate) mod plan;
 pub(crate) mod search;
 pub(crate) mod sweep;

@@ -1,11 +1,12 @@
 //! How far, and in which direction, to shift one thing out of another.
 //!
-//! The search is the same for two meshes, two scans, and a shape and a scan. Each is a [`Probe`] that
+//! The search is the same for two meshes, two scans, a scan and a mesh, and a scan and a shape. Each is a [`Probe`] that
 //! answers the search's questions.
 //!
 //! [`Probe`]: probe::Probe
 
 pub(crate) mod answer;
+pub(crate) mod apart;
 mod deepest;
 pub(crate) mod interior;
 pub(crate) mod probe;

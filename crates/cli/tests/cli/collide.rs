@@ -490,6 +490,36 @@ fn a_penetration_tells_how_to_get_scans_apart() {
     let [lower, upper] = [11, 12].map(|k| rows[1][k].parse::<f64>().unwrap());
     assert!(lower > 0.2 && lower < upper && (upper - 0.3).abs() < 0.05, "{table}");
     assert_eq!(rows[2][11..], ["", ""], "{table}");
-    let refused = place.run(&["collide", "floor.xyz", "ball.xyz", "--as-mesh", "a", "--penetration"]);
-    assert!(refused.status == 2 && refused.errors.contains("--penetration"), "{}", refused.errors);
+}
+
+/// The same box as a mesh, as a and as b, in a floor.
+#[test]
+fn a_penetration_tells_how_to_get_a_mesh_and_a_scan_apart() {
+    let place = Place::new();
+    place.cloud("floor.xyz", patch(4.0, 4.0), 0.05);
+    let corners = (0..8_u8).map(|n| [1, 2, 4].map(|bit| if n & bit == 0 { -0.5 } else { 0.5 }));
+    let corners = corners.map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+    let faces = ["1 2 4 3", "5 6 8 7", "1 2 6 5", "3 4 8 7", "1 3 7 5", "2 4 8 6"];
+    let faces = faces.map(|face| format!("f {face}\n"));
+    place.write("box.obj", &(corners.collect::<String>() + &faces.concat()));
+    let pose = shift(0.1, 0.2, 0.3);
+    let ask = |asked: &[&str]| {
+        let answer = place.ok(&[&["collide"], asked, &["--penetration", "--quiet"]].concat());
+        answer.json().remove(0)["penetration"].clone()
+    };
+    let of_b = ask(&["floor.xyz", "box.obj", "--as-mesh", "b", "--pose-b", &pose, "--json"]);
+    let of_a = ask(&["box.obj", "floor.xyz", "--as-mesh", "a", "--pose-a", &pose, "--json"]);
+    for (found, sign) in [(&of_b, 1.0), (&of_a, -1.0)] {
+        let [lower, upper] = ["lower", "upper"].map(|key| found[key].as_f64().unwrap());
+        assert!(lower > 0.15 && lower <= 0.2 + 1e-6 && (upper - 0.2).abs() < 0.02, "{found}");
+        assert!(sign * numbers(&found["direction"])[2] > 0.99, "{found}");
+    }
+    let asked = ["collide", "floor.xyz", "box.obj", "--as-mesh", "b", "--pose-b", &pose, "--penetration"];
+    let words = place.ok(&[&asked[..], &["--quiet"]].concat()).results;
+    assert!(words.contains("Moving b by 0.2") && words.contains("no move below 0.1"), "{words}");
+    for which in ["b", "both"] {
+        let refused = place.run(&[&asked[..], &["--solid", which]].concat());
+        let wanted = format!("got --solid {which}");
+        assert!(refused.status == 2 && refused.errors.contains(&wanted), "{}", refused.errors);
+    }
 }

@@ -134,6 +134,20 @@ pub struct Statistics {
     pub neighbour_steps: u64,
 }
 
+impl Statistics {
+    /// Adds the cost of a part of a query.
+    pub(crate) fn add(&mut self, part: &Self) {
+        self.evaluations += part.evaluations;
+        self.node_pairs += part.node_pairs;
+        self.leaf_pairs += part.leaf_pairs;
+    }
+
+    /// Returns the work of a query that consists of others.
+    pub(crate) fn work(&self) -> u64 {
+        self.evaluations + self.node_pairs
+    }
+}
+
 /// A verdict and its cost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Answer {

@@ -74,6 +74,11 @@ impl Budget {
         self.work.is_some() || self.deadline.is_some()
     }
 
+    /// What is left of the budget after `spent` units of work.
+    pub(crate) fn less(&self, spent: u64) -> Self {
+        Self { work: self.work.map(|work| work.saturating_sub(spent)), ..*self }
+    }
+
     /// Breaks if `spent` units of work, or the time, have reached a limit.
     pub(crate) fn go_on(&self, spent: u64) -> ControlFlow<()> {
         let is_over = self.work.is_some_and(|work| spent >= work)

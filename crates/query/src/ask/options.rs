@@ -206,6 +206,12 @@ impl Default for CollideOptions {
 }
 
 impl CollideOptions {
+    /// The options of a search that only asks whether things meet, by the default method.
+    pub(crate) fn of_verdicts(&self) -> Self {
+        let options = Self { evidence: Evidence::Estimated, detail: Detail::Verdict, ..*self };
+        Self { method: Method::Traversal, order: None, coverings: false, ..options }
+    }
+
     /// The default options with [estimated](Evidence::Estimated) separations: no proofs, and the
     /// fastest search.
     #[must_use]
@@ -442,11 +448,7 @@ impl CollidePlan {
 
     /// The plan of a search that only asks whether the scans meet, by the default method.
     pub(crate) fn of_verdicts(&self) -> Self {
-        let Self { options } = self;
-        let options = CollideOptions { evidence: Evidence::Estimated, detail: Detail::Verdict, ..*options };
-        Self {
-            options: CollideOptions { method: Method::Traversal, order: None, coverings: false, ..options },
-        }
+        Self { options: self.options.of_verdicts() }
     }
 
     /// The same plan with other test points, which must be in range.

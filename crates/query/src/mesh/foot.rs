@@ -7,6 +7,25 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{MeshHierarchy, MeshView, PlaceVisitor, SLACK};
 use nearmiss_mesh::nearest_on_triangle;
 
+use crate::mesh::placed::PlacedMesh;
+use crate::mesh::solid::SolidView;
+
+/// The distance of a place inside a solid, whose pose is that of `placed`, from its surface, and the
+/// direction away from there, all in the world. `None` for a place outside.
+pub(crate) fn depth_in_solid(
+    solid: &SolidView<'_>,
+    placed: &PlacedMesh<'_>,
+    place: Vector3<f64>,
+) -> Option<(f64, Vector3<f64>)> {
+    let pose = placed.pose();
+    let own = pose.apply_inverse(place.into());
+    if !solid.contains(own) {
+        return None;
+    }
+    let away = place - Vector3::from(pose.apply(foot(solid.mesh, solid.view, solid.level, own)));
+    Some((away.norm(), away.try_normalize(0.0).unwrap_or_else(Vector3::zeros)))
+}
+
 /// Finds the point of a mesh nearest to `place`, both in the frame of the mesh's input. O(log n).
 pub(crate) fn foot(mesh: &MeshHierarchy, view: &MeshView<'_>, level: Level, place: [f64; 3]) -> [f64; 3] {
     let frame = mesh.frame();

@@ -25,6 +25,12 @@ impl<'a> PlacedMesh<'a> {
         Self { mesh, pose: *pose, stored_to_world }
     }
 
+    /// The same placed mesh, shifted by `t` in the world.
+    pub(crate) fn shifted(&self, t: [f64; 3]) -> Self {
+        let [x, y, z] = self.pose.translation();
+        Self::new(self.mesh, &self.pose.with_translation([x + t[0], y + t[1], z + t[2]]))
+    }
+
     /// The mesh.
     #[must_use]
     pub fn mesh(&self) -> &'a MeshHierarchy {

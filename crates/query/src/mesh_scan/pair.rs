@@ -4,11 +4,14 @@ use crate::ask::answer::{Answer, Contacts};
 use crate::ask::budget::Budget;
 use crate::distance::{Distance, DistancePlan};
 use crate::mesh::placed::PlacedMesh;
+use crate::mesh::solid::MeshSolid;
 use crate::mesh_scan::collide::{AskedOfMesh, collide};
 use crate::mesh_scan::distance::distance;
 use crate::mesh_scan::hint::MeshScanHint;
+use crate::mesh_scan::penetration::penetration;
 use crate::mesh_scan::plan::MeshScanPlan;
 use crate::pair::placed::Placed;
+use crate::penetration::answer::{Interior, Penetration};
 use crate::question::Scratch;
 
 /// A placed scan, a placed mesh, and the budget of each question about them.
@@ -148,6 +151,48 @@ impl<'a> MeshScanPair<'a> {
     ) -> Distance {
         let Scratch { contact, distance: open, .. } = scratch;
         distance((&self.scan, &self.mesh), plan, &self.budget, (open, contact), Some(hint))
+    }
+
+    /// Bounds the penetration of the scan and the mesh: how far the mesh must at least be shifted, in any
+    /// direction, to be separate from the scan. Separate means that [`collide`](Self::collide) separates
+    /// them, and that no part of one is inside the other one if that is solid: the scan by `interior`, the
+    /// mesh by its closed parts in `solid`, which must be those of this mesh.
+    ///
+    /// Has the bounds, their validity and the cost that [`Pair::penetration`](crate::Pair::penetration)
+    /// has. The lower bound is 0 if the scan is hollow and the mesh has no closed part.
+    ///
+    /// ```
+    /// use nearmiss_geometry::{PointCloud, Pose, TriangleMesh};
+    /// use nearmiss_hierarchy::{BuildOptions, MeshBuildOptions, MeshHierarchy, PointHierarchy};
+    /// use nearmiss_query::{
+    ///     CollideOptions, Interior, MeshScanPair, MeshScanPlan, MeshSolid, PlacedMesh, Prepared, Scratch,
+    /// };
+    ///
+    /// // A tetrahedron whose tip is 0.1 below a scanned floor.
+    /// let points: Vec<[f32; 3]> =
+    ///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+    /// let floor = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+    /// let corners = vec![[0.5, 0.5, -0.1], [0.8, 0.5, 0.6], [0.3, 0.8, 0.6], [0.3, 0.2, 0.6]];
+    /// let tip = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])?;
+    /// let tip = MeshHierarchy::build(&tip, &MeshBuildOptions::default())?;
+    ///
+    /// let plan = MeshScanPlan::new(&CollideOptions::default(), &floor)?;
+    /// let pair = MeshScanPair::new(floor.at(&Pose::IDENTITY), PlacedMesh::new(&tip, &Pose::IDENTITY));
+    /// let solid = MeshSolid::new(&tip);
+    /// let found = pair.penetration(&plan, (Interior::Hollow, &solid), &mut Scratch::default());
+    /// assert!(found.lower > 0.0 && (found.upper - 0.1).abs() < 0.01, "{found:?}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn penetration(
+        &self,
+        plan: &MeshScanPlan,
+        (interior, solid): (Interior, &MeshSolid),
+        scratch: &mut Scratch,
+    ) -> Penetration {
+        let Scratch { contact, solid: shapes, penetration: own, .. } = scratch;
+        let working = (contact, &mut shapes.crossings);
+        penetration((self.scan, self.mesh), (interior, solid), (plan, &self.budget), working, own)
     }
 
     fn asked<'q>(&'q self, plan: &'q MeshScanPlan) -> AskedOfMesh<'q> {

@@ -49,6 +49,11 @@ impl MeshScanPlan {
         Self { options: *plan.touching().options() }
     }
 
+    /// The plan of a search that only asks whether the mesh and the scan meet.
+    pub(crate) fn of_verdicts(&self) -> Self {
+        Self { options: self.options.of_verdicts() }
+    }
+
     /// Returns the distance, in world units, up to which a triangle and a point or a surface count
     /// as meeting.
     #[must_use]

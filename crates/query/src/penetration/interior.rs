@@ -1,9 +1,10 @@
 //! The inside of a scan that encloses a solid.
 
 use fearless_simd::Level;
+use nearmiss_geometry::NodeId;
 
 use crate::ask::options::Semantics;
-use crate::pair::placed::ViewScratch;
+use crate::pair::placed::{Placed, ViewScratch};
 use crate::penetration::answer::Interior;
 use crate::penetration::probe::Vector;
 use crate::solid::cast::{Crossing, all_hits};
@@ -101,6 +102,50 @@ pub(crate) fn depth_in(
     let foot = Vector::from(frame.apply_inverse(found.points[0]));
     let uphill = (place - foot).try_normalize(0.0).unwrap_or_else(Vector::zeros);
     Some((found.lower / elements.scale(), uphill))
+}
+
+/// The same with all places and lengths in the world.
+pub(crate) fn world_depth_in(
+    elements: &Elements<'_>,
+    place: &Vector,
+    working: Working<'_>,
+) -> Option<(f64, Vector)> {
+    let frame = *elements.placed.stored_to_world();
+    let (depth, uphill) = depth_in(elements, &frame.apply_inverse((*place).into()).into(), working)?;
+    Some((depth * frame.scale(), frame.rotate(uphill.into()).into()))
+}
+
+/// Returns `true` if a place of the world is inside the surface of a scan.
+pub(crate) fn contains(elements: &Elements<'_>, place: &Vector, working: Working<'_>) -> bool {
+    is_inside(elements, &elements.placed.stored_to_world().apply_inverse((*place).into()).into(), working)
+}
+
+/// A ball about all that counts of a scan, in the world.
+pub(crate) fn world_ball(elements: &Elements<'_>) -> (Vector, f64) {
+    let frame = elements.placed.stored_to_world();
+    let root = elements.arrays.tree.enclosure(elements.part(), NodeId::ROOT);
+    let radius = f64::from(root.radius()) + elements.beyond_boxes();
+    (frame.apply(root.centre.map(f64::from)).into(), radius * frame.scale())
+}
+
+/// The axes of the bounding box of a scan, in the world.
+pub(crate) fn world_axes(elements: &Elements<'_>) -> [Vector; 3] {
+    let frame = elements.placed.stored_to_world();
+    elements.arrays.tree.root_box().axes.map(|axis| frame.rotate(axis.map(f64::from)).into())
+}
+
+/// Some points of a scan, spread over it, in the world.
+pub(crate) fn some_points(placed: Placed<'_>) -> impl Iterator<Item = Vector> {
+    /// The number of these points.
+    const PARTS: usize = 16;
+    (0..PARTS).map(move |n| placed.point(placed.scan().len() * n / PARTS).into())
+}
+
+/// The same as [`nearest_point`] with all places and lengths in the world.
+pub(crate) fn world_nearest_point(elements: &Elements<'_>, place: &Vector) -> Option<(Vector, f64)> {
+    let frame = elements.placed.stored_to_world();
+    let (point, radius) = nearest_point(elements, &frame.apply_inverse((*place).into()).into())?;
+    Some((frame.apply(point.into()).into(), radius * frame.scale()))
 }
 
 /// The measured point nearest to a place, in the stored frame, and the radius about it that is part of the

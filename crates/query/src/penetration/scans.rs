@@ -2,8 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use nearmiss_geometry::NodeId;
-
 use crate::ask::answer::{Answer, Contacts, Evidence, Reason, Statistics, Verdict};
 use crate::ask::budget::Budget;
 use crate::ask::options::{CollidePlan, Semantics};
@@ -11,25 +9,22 @@ use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
 use crate::pair::placed::Placed;
 use crate::pair::placed_balls::is_proper;
 use crate::penetration::answer::{Interior, Penetration};
-use crate::penetration::interior::{counts, depth_in, is_inside, nearest_point};
+use crate::penetration::apart::out_of_balls;
+use crate::penetration::interior::{
+    contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
+};
 use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
 use crate::penetration::search::search;
-use crate::penetration::survey::ContactSurvey;
+use crate::penetration::survey::{ContactSurvey, way_out};
 use crate::solid::cast::Crossing;
 use crate::solid::elements::Elements;
 use crate::solid::plan::ShapePlan;
-
-/// Points of a scan that are looked for inside the other one if their surfaces are apart.
-const PARTS: u32 = 16;
-
-/// Doublings of the shift that moves two balls apart.
-const DOUBLINGS: u32 = 64;
 
 /// Reusable memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PenetrationScratch {
     pub(crate) survey: ContactSurvey,
-    contacts: Contacts,
+    pub(crate) contacts: Contacts,
 }
 
 /// Two placed scans, and the cost of all tests so far. Shifts are those of b, in the world.
@@ -58,7 +53,7 @@ pub(crate) fn penetration<'s>(
     if !scans.iter().all(|scan| is_proper(scan.stored_to_world())) {
         return Penetration::UNKNOWN;
     }
-    let of_shapes = ShapePlan::of_pair(plan);
+    let of_shapes = ShapePlan::of_pair(plan.options());
     let elements = scans.map(|scan| Elements::new(scan, &of_shapes));
     let solid = [0, 1].map(|k: usize| counts(&elements[k], interiors[k]));
     let PenetrationScratch { survey, contacts } = scratch;
@@ -96,18 +91,13 @@ impl ScanProbe<'_> {
         let b = b.shifted(t.into());
         let asked = Asked { scans: [a, &b], plan, budget };
         let answer = collide(asked, self.contact, outputs);
-        let Statistics { evaluations, node_pairs, leaf_pairs, .. } = answer.statistics;
-        self.spent.evaluations += evaluations;
-        self.spent.node_pairs += node_pairs;
-        self.spent.leaf_pairs += leaf_pairs;
+        self.spent.add(&answer.statistics);
         answer
     }
 
     /// Asks whether the scans meet after a shift. Breaks if the budget is spent.
     fn collide(&mut self, t: Vector, outputs: Outputs<'_>) -> ControlFlow<(), Answer> {
-        let spent = self.spent.evaluations + self.spent.node_pairs;
-        let budget = Budget { work: self.budget.work.map(|work| work.saturating_sub(spent)), ..self.budget };
-        let plan = self.plan;
+        let (plan, budget) = (self.plan, self.budget.less(self.spent.work()));
         let answer = self.collide_with(t, &plan, outputs, &budget);
         match answer.verdict {
             Verdict::Undecided(Reason::Budget { .. }) => ControlFlow::Break(()),
@@ -115,54 +105,30 @@ impl ScanProbe<'_> {
         }
     }
 
-    /// A ball about all that counts of scan `k`, in the world.
-    fn ball(&self, k: usize) -> (Vector, f64) {
-        let (scan, placed) = (self.scans[k].scan(), self.scans[k].stored_to_world());
-        let root = scan.tree().enclosure(self.elements[k].part(), NodeId::ROOT);
-        let radius = f64::from(root.radius()) + self.elements[k].beyond_boxes();
-        (placed.apply(root.centre.map(f64::from)).into(), radius * placed.scale())
-    }
-
-    /// Finds a shift along the line of the centres after which the scans are apart. `None` if even far away
-    /// they are not found to be apart.
+    /// Finds a shift after which the scans are apart.
     fn out_of_balls(&mut self) -> Option<Vector> {
-        let ((a, r), (b, s)) = (self.ball(0), self.ball(1));
-        let between = b - a;
-        let way = between.try_normalize(1e-9 * (r + s)).unwrap_or_else(Vector::z);
-        let radii = r + s + self.plan.options().margin;
-        let mut length = (radii - way.dot(&between)).max(0.0) * (1.0 + 1e-5) + 1e-9 * radii;
-        let plan = self.plan;
-        // Rounding grows with the distance from the origin.
-        for _ in 0..DOUBLINGS {
-            let apart = self.collide_with(way * length, &plan, Outputs::default(), &Budget::UNLIMITED);
-            if apart.verdict.is_separated() {
-                return Some(way * length);
-            }
-            length *= 2.0;
-        }
-        None
+        let (balls, plan) = (self.elements.each_ref().map(world_ball), self.plan);
+        out_of_balls(balls, plan.options().margin, |t| {
+            let answer = self.collide_with(t, &plan, Outputs::default(), &Budget::UNLIMITED);
+            answer.verdict.is_separated()
+        })
     }
 
     /// Returns `true` if a part of the other scan is inside the solid of scan `k` after a shift.
     ///
     /// If the surfaces do not meet, each part of a scan is inside or outside as a whole.
     fn has_part_inside(&mut self, k: usize, t: Vector) -> bool {
-        let other = &self.scans[1 - k];
         let shift = if k == 0 { t } else { -t };
-        let count = other.scan().len();
-        (0..PARTS).any(|n| {
-            let i = count * n as usize / PARTS as usize;
-            let place = Vector::from(other.point(i)) + shift;
-            let stored = self.scans[k].stored_to_world().apply_inverse(place.into());
+        some_points(self.scans[1 - k]).any(|place| {
             self.spent.evaluations += 1;
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
-            is_inside(&self.elements[k], &stored.into(), working)
+            contains(&self.elements[k], &(place + shift), working)
         })
     }
 
     /// Breaks if the budget is spent.
     fn go_on(&self) -> ControlFlow<()> {
-        self.budget.go_on(self.spent.evaluations + self.spent.node_pairs)
+        self.budget.go_on(self.spent.work())
     }
 
     /// Measures how deep a place is in both scans, of which some are solid. The place is moved to the nearest
@@ -170,19 +136,15 @@ impl ScanProbe<'_> {
     fn deep_in(&mut self, place: Vector, solid: [bool; 2]) -> Option<Deep> {
         let mut found = Deep { place, depth: self.plan.options().margin, uphill: Vector::zeros() };
         for k in (0..2).filter(|&k| !solid[k]) {
-            let placed = self.scans[k].stored_to_world();
-            let (point, radius) =
-                nearest_point(&self.elements[k], &placed.apply_inverse(place.into()).into())?;
-            found.place = placed.apply(point.into()).into();
-            found.depth += radius * placed.scale();
+            let (point, radius) = world_nearest_point(&self.elements[k], &found.place)?;
+            found.place = point;
+            found.depth += radius;
         }
         for k in (0..2).filter(|&k| solid[k]) {
-            let placed = *self.scans[k].stored_to_world();
-            let stored = Vector::from(placed.apply_inverse(found.place.into()));
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
-            let (depth, uphill) = depth_in(&self.elements[k], &stored, working)?;
-            found.depth += depth * placed.scale();
-            found.uphill += Vector::from(placed.rotate(uphill.into()));
+            let (depth, uphill) = world_depth_in(&self.elements[k], &found.place, working)?;
+            found.depth += depth;
+            found.uphill += uphill;
         }
         Some(found)
     }
@@ -209,10 +171,7 @@ impl Probe for ScanProbe<'_> {
         let Verdict::Intersecting { contact, .. } = self.collide(t, Outputs::default())?.verdict else {
             return ControlFlow::Continue(None);
         };
-        let normals = contact.normals.unwrap_or([[0.0; 3]; 2]).map(Vector::from);
-        let [a, b] = normals.map(|normal| normal * 1.0_f64.copysign(normal.dot(&t)));
-        let way = if a.dot(&t) >= b.dot(&t) { a } else { b };
-        ControlFlow::Continue(Some((contact.point.into(), way)))
+        ControlFlow::Continue(Some((contact.point.into(), way_out(&contact, t))))
     }
 
     fn survey(&mut self, survey: &mut ContactSurvey) -> ControlFlow<()> {
@@ -220,10 +179,7 @@ impl Probe for ScanProbe<'_> {
         let mut contacts = std::mem::take(self.contacts);
         let outputs = Outputs { contacts: Some(&mut contacts), ..Outputs::default() };
         let flow = self.collide(Vector::zeros(), outputs);
-        for contact in &contacts.contacts {
-            let normals = contact.normals.unwrap_or([[0.0; 3]; 2]).map(Vector::from);
-            survey.add(contact.point.into(), normals, self.depth_of(contact.residual));
-        }
+        survey.add_all(&contacts, |residual| self.depth_of(residual));
         let is_cut_short = !contacts.complete && self.budget.may_end();
         *self.contacts = contacts;
         flow?;
@@ -247,14 +203,11 @@ impl Probe for ScanProbe<'_> {
     }
 
     fn centres(&self) -> [Vector; 2] {
-        [self.ball(0).0, self.ball(1).0]
+        self.elements.each_ref().map(|elements| world_ball(elements).0)
     }
 
     fn axes(&self) -> [[Vector; 3]; 2] {
-        self.scans.map(|scan| {
-            let placed = *scan.stored_to_world();
-            scan.scan().root_box().axes.map(|axis| Vector::from(placed.rotate(axis.map(f64::from))))
-        })
+        self.elements.each_ref().map(world_axes)
     }
 
     fn slack(&self) -> f64 {
@@ -262,10 +215,10 @@ impl Probe for ScanProbe<'_> {
     }
 
     fn rounding(&self) -> f64 {
-        let far = |k: usize| {
-            let (centre, radius) = self.ball(k);
+        let far = self.elements.each_ref().map(|elements| {
+            let (centre, radius) = world_ball(elements);
             centre.amax() + radius
-        };
-        1e-12 * (far(0) + far(1))
+        });
+        1e-12 * (far[0] + far[1])
     }
 }

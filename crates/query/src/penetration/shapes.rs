@@ -8,6 +8,7 @@ use crate::ask::answer::{Evidence, Statistics};
 use crate::ask::budget::Budget;
 use crate::pair::placed::ViewScratch;
 use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{counts, depth_in, is_inside, nearest_point};
 use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
 use crate::penetration::search::search;
@@ -18,9 +19,6 @@ use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
 use crate::solid::scratch::SolidScratch;
 use crate::solid::touch::touch;
-
-/// Doublings of the shift that moves the shape away.
-const DOUBLINGS: u32 = 64;
 
 /// A scan as a, and a shape as b.
 struct ShapeProbe<'s, 'a> {
@@ -47,7 +45,7 @@ pub(crate) fn penetration(
     let is_solid = counts(elements, interior);
     let (budget, spent) = (*budget, Statistics::default());
     let mut probe = ShapeProbe { elements, solid, is_solid, budget, level, scratch, memory, spent };
-    let Some(out) = probe.out_of_ball() else { return Penetration::UNKNOWN };
+    let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
     let bounds = search(&mut probe, out, survey);
     let answer = probe.touch_at(bounds.shift);
     let evidence = match answer.verdict {
@@ -65,24 +63,14 @@ impl ShapeProbe<'_, '_> {
         touch(self.elements, Some(&self.solid.shifted(&t)), (self.level, &mut *self.scratch))
     }
 
-    /// Finds a shift away from the centre of the scan after which the shape touches nothing. `None` if even
-    /// far away it is not found to be separate.
-    fn out_of_ball(&mut self) -> Option<Vector> {
-        let bounds = self.elements.arrays.tree.root_box();
-        let centre = Vector::from(bounds.centre.map(f64::from));
-        let size = f64::from(bounds.radius() + bounds.reach) + self.elements.beyond_boxes();
-        let own = self.solid.half.norm() + self.solid.radius;
-        let between = self.solid.centre - centre;
-        let way = between.try_normalize(1e-9 * (size + own)).unwrap_or_else(Vector::z);
-        let radii = size + own + self.elements.margin;
-        let mut length = (radii - way.dot(&between)).max(0.0) * (1.0 + 1e-5) + 1e-9 * radii;
-        for _ in 0..DOUBLINGS {
-            if self.touch_at(way * length).verdict.is_separated() {
-                return Some(way * length);
-            }
-            length *= 2.0;
-        }
-        None
+    /// Finds a shift after which the shape touches nothing.
+    fn out_of_balls(&mut self) -> Option<Vector> {
+        let (elements, solid) = (self.elements, self.solid);
+        let bounds = elements.arrays.tree.root_box();
+        let radius = f64::from(bounds.radius() + bounds.reach) + elements.beyond_boxes();
+        let of_scan = (Vector::from(bounds.centre.map(f64::from)), radius);
+        let own = (solid.centre, solid.half.norm() + solid.radius);
+        out_of_balls([of_scan, own], elements.margin, |t| self.touch_at(t).verdict.is_separated())
     }
 
     /// Breaks if the budget is spent. A test of the shape counts as an evaluation.

@@ -2,6 +2,8 @@
 
 use nearmiss_geometry::nalgebra::Vector3;
 
+use crate::ask::answer::{Contact, Contacts};
+
 type Vector = Vector3<f64>;
 
 /// The contacts of two things in brief.
@@ -22,6 +24,17 @@ pub(crate) struct ContactSurvey {
 
 /// The number of contacts whose normals are kept at most.
 pub(crate) const KEPT: usize = 8;
+
+/// The unit normals of both surfaces; 0 if they are not known.
+fn normals(contact: &Contact) -> [Vector; 2] {
+    contact.normals.unwrap_or([[0.0; 3]; 2]).map(Vector::from)
+}
+
+/// The direction, of those of both normals and their opposites, that is nearest to a shift.
+pub(crate) fn way_out(contact: &Contact, t: Vector) -> Vector {
+    let [a, b] = normals(contact).map(|normal| normal * 1.0_f64.copysign(normal.dot(&t)));
+    if a.dot(&t) >= b.dot(&t) { a } else { b }
+}
 
 impl ContactSurvey {
     /// Forgets all contacts, and keeps the memory.
@@ -55,6 +68,13 @@ impl ContactSurvey {
         }
         self.count += 1;
         self.least = self.least.max(depth);
+    }
+
+    /// Adds contacts; `depth` returns the greatest shift under which one stays, from its residual.
+    pub(crate) fn add_all(&mut self, contacts: &Contacts, depth: impl Fn(f64) -> f64) {
+        for contact in &contacts.contacts {
+            self.add(contact.point.into(), normals(contact), depth(contact.residual));
+        }
     }
 
     /// Returns the mean of the points.

@@ -38,9 +38,9 @@ impl ShapePlan {
         Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
     }
 
-    /// The plan for one scan of a pair, with its meaning of contact. Nothing evaluates the implicit function.
-    pub(crate) fn of_pair(plan: &CollidePlan) -> Self {
-        Self::proving(plan.options().with_detail(Detail::Verdict))
+    /// The plan for one scan of a pair, with the options of the pair. Nothing evaluates the implicit function.
+    pub(crate) fn of_pair(options: &CollideOptions) -> Self {
+        Self::proving(options.with_detail(Detail::Verdict))
     }
 
     /// The plan for the distance of a scan and a shape, with the meaning of one for two scans.

@@ -9,12 +9,13 @@ use nearmiss_hierarchy::{MeshView, Stack};
 use crate::ask::answer::Statistics;
 use crate::ask::budget::Budget;
 use crate::mesh::collide::first_met;
-use crate::mesh::foot::foot;
+use crate::mesh::foot::depth_in_solid;
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::penetration::contacts::survey;
 use crate::mesh::penetration::triangle_depth::triangle_depth;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::{MeshSolid, SolidView};
+use crate::penetration::apart::out_of_balls;
 use crate::penetration::probe::{Deep, Probe, Vector};
 use crate::penetration::survey::ContactSurvey;
 
@@ -41,16 +42,10 @@ impl<'s> MeshProbe<'s> {
         Self { meshes, views, solids, budget: *budget, level, stack, spent: Statistics::default() }
     }
 
-    /// Returns the pose of b, shifted by `t`.
-    fn pose_of_b(&self, t: Vector) -> Pose {
-        let pose = self.meshes[1].pose();
-        pose.with_translation((Vector::from(pose.translation()) + t).into())
-    }
-
     /// Returns the meshes with b shifted by `t`.
     fn shifted(&self, t: Vector) -> [PlacedMesh<'s>; 2] {
         let [a, b] = self.meshes;
-        [a, PlacedMesh::new(b.mesh(), &self.pose_of_b(t))]
+        [a, b.shifted(t.into())]
     }
 
     /// Returns the pair of shifted meshes; `None` if a pose is invalid.
@@ -63,36 +58,16 @@ impl<'s> MeshProbe<'s> {
 
     /// Returns what is left of the budget. The limit against damaged files is that of each test.
     fn budget(&self) -> Budget {
-        let spent = self.spent.evaluations + self.spent.node_pairs;
-        Budget { work: self.budget.work.map(|work| work.saturating_sub(spent)), ..self.budget }
+        self.budget.less(self.spent.work())
     }
 
-    /// Counts what a test has spent.
-    fn spend(&mut self, spent: &Statistics) {
-        self.spent.evaluations += spent.evaluations;
-        self.spent.node_pairs += spent.node_pairs;
-        self.spent.leaf_pairs += spent.leaf_pairs;
-    }
-
-    /// Returns a shift along the line of the centres after which the bounding balls are apart; `None`
-    /// if a pose is invalid.
+    /// Returns a shift after which the bounding balls are apart; `None` if a pose is invalid.
     pub(crate) fn out_of_balls(&self) -> Option<Vector> {
-        let ball = |k: usize| {
+        let balls = [0, 1].map(|k: usize| {
             let (placed, ball) = (self.meshes[k].stored_to_world(), self.views[k].ball);
             (Vector::from(placed.apply(ball.centre)), ball.radius * placed.scale())
-        };
-        let ((a, r), (b, s)) = (ball(0), ball(1));
-        let between = b - a;
-        let way = between.try_normalize(1e-9 * (r + s)).unwrap_or_else(Vector::z);
-        let mut length = (r + s - way.dot(&between)).max(0.0) * (1.0 + 1e-5) + 1e-9 * (r + s);
-        // Rounding grows with the distance from the origin.
-        for _ in 0..64 {
-            if self.pair(&self.shifted(way * length))?.gap > 0.0 {
-                return Some(way * length);
-            }
-            length *= 2.0;
-        }
-        None
+        });
+        out_of_balls(balls, 0.0, |t| self.pair(&self.shifted(t)).is_some_and(|pair| pair.gap > 0.0))
     }
 
     /// Returns `true` if a part of the other mesh begins inside the solid of mesh `k`.
@@ -118,7 +93,7 @@ impl Probe for MeshProbe<'_> {
         let meshes = self.shifted(t);
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         let (flow, met) = first_met(&mut pair, self.stack);
-        self.spend(&pair.meter.spent);
+        self.spent.add(&pair.meter.spent);
         let Some(met) = met else { return flow.map_continue(|()| None) };
         let [a, b] = pair.corners(met);
         let pose = pair.meshes[0].pose();
@@ -133,12 +108,12 @@ impl Probe for MeshProbe<'_> {
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         let are_balls_apart = pair.gap > 0.0;
         let (flow, met) = first_met(&mut pair, self.stack);
-        self.spend(&pair.meter.spent);
+        self.spent.add(&pair.meter.spent);
         if met.is_some() {
             return ControlFlow::Continue(false);
         }
         flow?;
-        let poses = [*self.meshes[0].pose(), self.pose_of_b(t)];
+        let poses = meshes.map(|placed| *placed.pose());
         let is_nested =
             !are_balls_apart && (self.has_part_inside(0, &poses) || self.has_part_inside(1, &poses));
         ControlFlow::Continue(!is_nested)
@@ -148,7 +123,7 @@ impl Probe for MeshProbe<'_> {
         let meshes = self.meshes;
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         let flow = survey(&mut pair, self.stack, found);
-        self.spend(&pair.meter.spent);
+        self.spent.add(&pair.meter.spent);
         flow
     }
 
@@ -159,15 +134,12 @@ impl Probe for MeshProbe<'_> {
         pair.meter.go_on()?;
         self.spent.evaluations += 1;
         let mut found = Deep { place, depth: 0.0, uphill: Vector::zeros() };
-        for (k, solid) in [a, b].iter().enumerate() {
-            let pose = self.meshes[k].pose();
-            let own = pose.apply_inverse(place.into());
-            if !solid.contains(own) {
+        for (solid, placed) in [a, b].iter().zip(&self.meshes) {
+            let Some((depth, uphill)) = depth_in_solid(solid, placed, place) else {
                 return ControlFlow::Continue(None);
-            }
-            let away = place - Vector::from(pose.apply(foot(solid.mesh, solid.view, self.level, own)));
-            found.depth += away.norm();
-            found.uphill += away.try_normalize(0.0).unwrap_or_else(Vector::zeros);
+            };
+            found.depth += depth;
+            found.uphill += uphill;
         }
         ControlFlow::Continue(Some(found))
     }

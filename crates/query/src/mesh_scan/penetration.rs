@@ -1,0 +1,244 @@
+//! The penetration of a scan and a mesh.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::MeshView;
+
+use crate::ask::answer::{Answer, Contacts, Evidence, Reason, Statistics, Verdict};
+use crate::ask::budget::Budget;
+use crate::ask::options::Semantics;
+use crate::contact::collide::ContactScratch;
+use crate::mesh::foot::{depth_in_solid, foot};
+use crate::mesh::placed::PlacedMesh;
+use crate::mesh::solid::{MeshSolid, SolidView};
+use crate::mesh_scan::collide::{AskedOfMesh, collide};
+use crate::mesh_scan::plan::MeshScanPlan;
+use crate::pair::placed::Placed;
+use crate::pair::placed_balls::is_proper;
+use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::apart::out_of_balls;
+use crate::penetration::interior::{
+    contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
+};
+use crate::penetration::probe::{Deep, Probe, SLACK};
+use crate::penetration::scans::PenetrationScratch;
+use crate::penetration::search::search;
+use crate::penetration::survey::{ContactSurvey, way_out};
+use crate::solid::cast::Crossing;
+use crate::solid::elements::Elements;
+use crate::solid::plan::ShapePlan;
+
+type Vector = Vector3<f64>;
+
+/// A placed scan as a, a placed mesh as b, and the cost of all tests so far. Shifts are those of the mesh,
+/// in the world.
+struct MeshScanProbe<'s> {
+    scan: Placed<'s>,
+    elements: Elements<'s>,
+    mesh: PlacedMesh<'s>,
+    view: &'s MeshView<'s>,
+    solid: &'s MeshSolid,
+    /// `true` for each of the scan and the mesh whose inside counts.
+    are_solid: [bool; 2],
+    plan: MeshScanPlan,
+    budget: Budget,
+    contact: &'s mut ContactScratch,
+    crossings: &'s mut Vec<Crossing>,
+    contacts: &'s mut Contacts,
+    spent: Statistics,
+}
+
+/// Bounds the penetration of a scan and a mesh, whose solid is `solid`.
+pub(crate) fn penetration<'s>(
+    (scan, mesh): (Placed<'s>, PlacedMesh<'s>),
+    (interior, solid): (Interior, &'s MeshSolid),
+    (plan, budget): (&MeshScanPlan, &Budget),
+    (contact, crossings): (&'s mut ContactScratch, &'s mut Vec<Crossing>),
+    scratch: &'s mut PenetrationScratch,
+) -> Penetration {
+    if !solid.is_of(mesh.mesh()) || !is_proper(scan.stored_to_world()) || !is_proper(mesh.stored_to_world()) {
+        return Penetration::UNKNOWN;
+    }
+    let elements = Elements::new(scan, &ShapePlan::of_pair(plan.options()));
+    let view = mesh.mesh().arrays();
+    let PenetrationScratch { survey, contacts } = scratch;
+    let mut probe = MeshScanProbe {
+        scan,
+        elements,
+        mesh,
+        view: &view,
+        solid,
+        are_solid: [counts(&elements, interior), solid.is_closed()],
+        plan: plan.of_verdicts(),
+        budget: Budget { resolution: None, ..*budget },
+        contact,
+        crossings,
+        contacts,
+        spent: Statistics::default(),
+    };
+    let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
+    let bounds = search(&mut probe, out, survey);
+    let answer = probe.collide_with(bounds.shift, plan, None, &Budget::UNLIMITED);
+    let evidence = match answer.verdict {
+        Verdict::Separated { evidence, .. } => evidence,
+        _ => Evidence::Estimated,
+    };
+    Penetration::new(&bounds, (1.0, |way| way.into()), (evidence, answer.band), probe.spent)
+}
+
+impl<'s> MeshScanProbe<'s> {
+    /// Asks whether the scan and the mesh meet after a shift.
+    fn collide_with(
+        &mut self,
+        t: Vector,
+        plan: &MeshScanPlan,
+        contacts: Option<&mut Contacts>,
+        budget: &Budget,
+    ) -> Answer {
+        let mesh = self.mesh.shifted(t.into());
+        let asked = AskedOfMesh { scan: &self.scan, mesh: &mesh, plan, budget };
+        let answer = collide(asked, self.contact, (None, contacts));
+        self.spent.add(&answer.statistics);
+        answer
+    }
+
+    /// Asks whether they meet after a shift. Breaks if the budget is spent.
+    fn collide(&mut self, t: Vector, contacts: Option<&mut Contacts>) -> ControlFlow<(), Answer> {
+        let (plan, budget) = (self.plan, self.budget.less(self.spent.work()));
+        let answer = self.collide_with(t, &plan, contacts, &budget);
+        match answer.verdict {
+            Verdict::Undecided(Reason::Budget { .. }) => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(answer),
+        }
+    }
+
+    /// A ball about the mesh, in the world.
+    fn ball_of_mesh(&self) -> (Vector, f64) {
+        let placed = self.mesh.stored_to_world();
+        (placed.apply(self.view.ball.centre).into(), self.view.ball.radius * placed.scale())
+    }
+
+    /// Finds a shift after which the scan and the mesh are apart.
+    fn out_of_balls(&mut self) -> Option<Vector> {
+        let (balls, plan) = ([world_ball(&self.elements), self.ball_of_mesh()], self.plan);
+        out_of_balls(balls, plan.options().margin, |t| {
+            self.collide_with(t, &plan, None, &Budget::UNLIMITED).verdict.is_separated()
+        })
+    }
+
+    fn solid_view(&self) -> SolidView<'s> {
+        let (mesh, level) = (self.mesh.mesh(), self.contact.level);
+        SolidView { mesh, view: self.view, solid: self.solid, level }
+    }
+
+    /// Returns `true` if a part of one is inside the other, which is solid, after a shift.
+    ///
+    /// If the surfaces do not meet, each part is inside or outside as a whole.
+    fn are_nested(&mut self, t: Vector) -> bool {
+        let [is_scan_solid, is_mesh_solid] = self.are_solid;
+        let (pose, solid) = (*self.mesh.pose(), self.solid_view());
+        let of_scan = || some_points(self.scan).map(|place| pose.apply_inverse((place - t).into()));
+        if is_mesh_solid && of_scan().any(|place| solid.contains(place)) {
+            return true;
+        }
+        is_scan_solid
+            && self.solid.places(self.view).any(|place| {
+                self.spent.evaluations += 1;
+                let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
+                contains(&self.elements, &(Vector::from(pose.apply(place)) + t), working)
+            })
+    }
+
+    /// Measures how deep a place is in both, of which some are solid. The place is moved to the nearest point
+    /// of one that is not: a measured one of the scan, any one of the mesh.
+    fn deep_in(&mut self, place: Vector, [is_scan_solid, is_mesh_solid]: [bool; 2]) -> Option<Deep> {
+        let mut found = Deep { place, depth: self.plan.options().margin, uphill: Vector::zeros() };
+        if !is_scan_solid {
+            let (point, radius) = world_nearest_point(&self.elements, &found.place)?;
+            found.place = point;
+            found.depth += radius;
+        }
+        let (pose, solid) = (*self.mesh.pose(), self.solid_view());
+        if !is_mesh_solid {
+            let own = pose.apply_inverse(found.place.into());
+            found.place = pose.apply(foot(solid.mesh, solid.view, solid.level, own)).into();
+        }
+        if is_scan_solid {
+            let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
+            let (depth, uphill) = world_depth_in(&self.elements, &found.place, working)?;
+            found.depth += depth;
+            found.uphill += uphill;
+        }
+        if is_mesh_solid {
+            let (depth, uphill) = depth_in_solid(&solid, &self.mesh, found.place)?;
+            found.depth += depth;
+            found.uphill += uphill;
+        }
+        Some(found)
+    }
+}
+
+impl Probe for MeshScanProbe<'_> {
+    fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
+        let answer = self.collide(t, None)?;
+        ControlFlow::Continue(answer.verdict.is_separated() && !self.are_nested(t))
+    }
+
+    /// The direction is that of the normal that is nearest to the shift.
+    fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
+        let Verdict::Intersecting { contact, .. } = self.collide(t, None)?.verdict else {
+            return ControlFlow::Continue(None);
+        };
+        ControlFlow::Continue(Some((contact.point.into(), way_out(&contact, t))))
+    }
+
+    fn survey(&mut self, survey: &mut ContactSurvey) -> ControlFlow<()> {
+        survey.clear();
+        let mut contacts = std::mem::take(self.contacts);
+        let flow = self.collide(Vector::zeros(), Some(&mut contacts));
+        // The greatest shift under which a ball and a triangle stay in contact.
+        let is_thickened = matches!(self.plan.options().semantics, Semantics::Thickened(_));
+        let reach = self.plan.reach();
+        survey.add_all(&contacts, |residual| if is_thickened { reach - 2.0 * residual } else { 0.0 });
+        let is_cut_short = !contacts.complete && self.budget.may_end();
+        *self.contacts = contacts;
+        flow?;
+        if is_cut_short { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+        if self.are_solid == [false; 2] {
+            return ControlFlow::Continue(None);
+        }
+        self.budget.go_on(self.spent.work())?;
+        self.spent.evaluations += 1;
+        let mut found = self.deep_in(place, self.are_solid);
+        if self.are_solid == [true; 2] {
+            // A solid may be too thin for a place inside to be hit; its surface counts as well.
+            found = found.or_else(|| self.deep_in(place, [true, false]));
+            found = found.or_else(|| self.deep_in(place, [false, true]));
+        }
+        ControlFlow::Continue(found)
+    }
+
+    fn centres(&self) -> [Vector; 2] {
+        [world_ball(&self.elements).0, self.ball_of_mesh().0]
+    }
+
+    fn axes(&self) -> [[Vector; 3]; 2] {
+        let placed = self.mesh.stored_to_world();
+        let of_mesh = self.view.tree.root_box().axes;
+        [world_axes(&self.elements), of_mesh.map(|axis| placed.rotate(axis.map(f64::from)).into())]
+    }
+
+    fn slack(&self) -> f64 {
+        SLACK * self.scan.sampling_radius()
+    }
+
+    fn rounding(&self) -> f64 {
+        let far =
+            [world_ball(&self.elements), self.ball_of_mesh()].map(|(centre, radius)| centre.amax() + radius);
+        1e-12 * (far[0] + far[1])
+    }
+}
