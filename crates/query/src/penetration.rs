@@ -1,7 +1,7 @@
 //! How far, and in which direction, to shift one thing out of another.
 //!
-//! The search is the same for two meshes, two scans, a scan and a mesh, and a scan and a shape. Each is a [`Probe`] that
-//! answers the search's questions.
+//! The search is the same for two meshes, two scans, a scan and a mesh, and a scan and a shape. Each is a
+//! [`Probe`] that answers the search's questions.
 //!
 //! [`Probe`]: probe::Probe
 

@@ -20,6 +20,7 @@ mod looking_inside;
 mod making_poses;
 mod mesh_scans;
 mod meshes;
+mod moving_out;
 mod on_disk;
 mod paths;
 mod prepare;

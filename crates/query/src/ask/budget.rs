@@ -74,7 +74,7 @@ impl Budget {
         self.work.is_some() || self.deadline.is_some()
     }
 
-    /// What is left of the budget after `spent` units of work.
+    /// The rest of the budget after `spent` units of work.
     pub(crate) fn less(&self, spent: u64) -> Self {
         Self { work: self.work.map(|work| work.saturating_sub(spent)), ..*self }
     }

@@ -17,8 +17,9 @@ pub enum Interior {
     Solid,
 }
 
-/// The penetration of two meshes, two scans, or a scan and a mesh or a shape, in world units: lower ≤ length of
-/// the least shift that separates them ≤ upper. Of two alike b is shifted; otherwise the mesh or the shape.
+/// The penetration of two meshes, two scans, or a scan and a mesh or a shape, in world units: lower ≤ length
+/// of the least shift that separates them ≤ upper. Of two alike b is shifted; otherwise the mesh or the
+/// shape.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penetration {
     /// A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found.

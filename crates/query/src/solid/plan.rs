@@ -38,7 +38,8 @@ impl ShapePlan {
         Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
     }
 
-    /// The plan for one scan of a pair, with the options of the pair. Nothing evaluates the implicit function.
+    /// The plan for one scan of a pair, with the options of the pair. Nothing evaluates the implicit
+    /// function.
     pub(crate) fn of_pair(options: &CollideOptions) -> Self {
         Self::proving(options.with_detail(Detail::Verdict))
     }
