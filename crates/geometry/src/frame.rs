@@ -50,8 +50,10 @@ impl Frame {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is the purpose")]
     pub fn to_local(&self, p: [f64; 3]) -> [f32; 3] {
+        // Exact, for a power of two. Loops compute it once.
+        let per_unit = 1.0 / self.scale;
         // Adding 0 turns -0 into 0, so that equal points have equal bits.
-        [0, 1, 2].map(|k| ((p[k] - self.origin[k]) / self.scale) as f32 + 0.0)
+        [0, 1, 2].map(|k| ((p[k] - self.origin[k]) * per_unit) as f32 + 0.0)
     }
 
     /// Converts a stored point to the caller's frame.

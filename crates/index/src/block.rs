@@ -41,12 +41,30 @@ impl PointBlock {
     #[must_use]
     pub fn of(positions: &[[f32; 3]]) -> Self {
         let mut block = Self::EMPTY;
+        block.place(positions);
+        block
+    }
+
+    /// Sets the positions of the first points.
+    ///
+    /// # Panics
+    /// If there are more than [`Self::WIDTH`].
+    #[inline(always)]
+    pub fn place(&mut self, positions: &[[f32; 3]]) {
+        if let Ok(positions) = <&[[f32; 3]; WIDTH]>::try_from(positions) {
+            // A known length is faster.
+            for lane in 0..WIDTH {
+                for k in 0..3 {
+                    self.position[k][lane] = positions[lane][k];
+                }
+            }
+            return;
+        }
         for (lane, p) in positions.iter().enumerate() {
             for k in 0..3 {
-                block.position[k][lane] = p[k];
+                self.position[k][lane] = p[k];
             }
         }
-        block
     }
 
     /// Returns the blocks of all points of a scan, with support radius zero.

@@ -190,6 +190,71 @@ pub fn change_both<A: Send, B: Send>(
     }
 }
 
+/// Parts of arrays that belong to the same items, and can be divided between threads.
+pub trait Divide: Sized + Send {
+    /// Divides the parts before an item, counted from the first one.
+    fn divide(self, item: usize) -> (Self, Self);
+}
+
+/// A part of an array with a number of elements for each item; the last item may have fewer.
+#[derive(Debug)]
+pub struct Runs<'a, T> {
+    /// The elements.
+    pub elements: &'a mut [T],
+    /// The number of elements for an item.
+    pub each: usize,
+}
+
+/// Creates the [`Runs`] of `each` elements.
+pub const fn runs<T>(elements: &mut [T], each: usize) -> Runs<'_, T> {
+    Runs { elements, each }
+}
+
+impl<T: Send> Divide for Runs<'_, T> {
+    fn divide(self, item: usize) -> (Self, Self) {
+        let place = self.elements.len().min(item * self.each);
+        let (left, right) = self.elements.split_at_mut(place);
+        (runs(left, self.each), runs(right, self.each))
+    }
+}
+
+macro_rules! divide_tuples {
+    ($($part:ident $place:tt),*) => {
+        impl<$($part: Divide),*> Divide for ($($part,)*) {
+            fn divide(self, item: usize) -> (Self, Self) {
+                let halves = ($(self.$place.divide(item),)*);
+                (($(halves.$place.0,)*), ($(halves.$place.1,)*))
+            }
+        }
+    };
+}
+divide_tuples!(A 0, B 1);
+divide_tuples!(A 0, B 1, C 2, D 3);
+divide_tuples!(A 0, B 1, C 2, D 3, E 4);
+divide_tuples!(A 0, B 1, C 2, D 3, E 4, F 5);
+
+/// Passes ranges of `items` with the `parts` of several arrays that belong to them to `f`, which changes
+/// these. Ranges have `at_once` items, the last may have fewer.
+///
+/// One loop over several arrays reads each of them once, while it is in the cache.
+pub fn change_together<P: Divide>(
+    items: Range<usize>,
+    at_once: usize,
+    parts: P,
+    f: &(impl Fn(Range<usize>, P) + Sync + Send),
+) {
+    if items.len() <= at_once {
+        return f(items, parts);
+    }
+    let half = items.len().div_ceil(at_once) / 2 * at_once;
+    let middle = items.start + half;
+    let (left, right) = parts.divide(half);
+    both(
+        || change_together(items.start..middle, at_once, left, f),
+        || change_together(middle..items.end, at_once, right, f),
+    );
+}
+
 /// Runs both closures, in parallel if there are several threads, and returns both results.
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     #[cfg(feature = "rayon")]
@@ -260,6 +325,18 @@ mod tests {
         collect_into(&mut out, 50, |range| range.flat_map(|i| [2 * i, 2 * i + 1]).collect());
         assert_eq!(out, (0..100).collect::<Vec<_>>());
         in_order(0, |_| (), |()| unreachable!("there is nothing to do"));
+    }
+
+    #[test]
+    fn arrays_are_changed_together() {
+        let (mut a, mut b) = (vec![0; 23], vec![0; 12]);
+        change_together(3..15, 5, (runs(&mut a, 2), runs(&mut b, 1)), &|items, (a, b)| {
+            assert!((a.each, b.each) == (2, 1) && items.len() == b.elements.len(), "{items:?}");
+            a.elements.fill(items.start);
+            b.elements.fill(items.end);
+        });
+        assert_eq!(b, [8, 8, 8, 8, 8, 13, 13, 13, 13, 13, 15, 15]);
+        assert_eq!(a, [vec![3; 10], vec![8; 10], vec![13; 3]].concat(), "the last item has one element");
     }
 
     #[test]

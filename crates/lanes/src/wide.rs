@@ -175,6 +175,43 @@ pub fn greatest<S: Simd>(lanes: f32x16<S>, greatest: f32) -> f32 {
     if own > greatest { own } else { greatest }
 }
 
+/// Returns the sum of all lanes, added in halves: the same with any instruction set.
+#[inline(always)]
+#[must_use]
+pub fn sum<S: Simd>(lanes: f32x16<S>) -> f32 {
+    let (low, high) = lanes.split();
+    let (low, high) = (low + high).split();
+    let [a, b, c, d] = (low + high).to_array();
+    (a + c) + (b + d)
+}
+
+/// Returns the minimum of each of sixteen rows. None of the numbers may be NaN.
+#[inline(always)]
+#[must_use]
+pub fn least_of_each<S: Simd>(rows: [f32x16<S>; WIDTH]) -> [f32; WIDTH] {
+    reduced(rows, |a, b| a.min(b))
+}
+
+/// Returns the maximum of each of sixteen rows. None of the numbers may be NaN.
+#[inline(always)]
+#[must_use]
+pub fn greatest_of_each<S: Simd>(rows: [f32x16<S>; WIDTH]) -> [f32; WIDTH] {
+    reduced(rows, |a, b| a.max(b))
+}
+
+/// Combines the lanes of each of sixteen rows.
+#[inline(always)]
+fn reduced<S: Simd>(r: [f32x16<S>; WIDTH], f: impl Fn(f32x16<S>, f32x16<S>) -> f32x16<S>) -> [f32; WIDTH] {
+    // Each round leaves half as many rows, of twice as many inputs each. Unrolled by hand: a loop would
+    // keep the rows in memory.
+    let both = |a: f32x16<S>, b: f32x16<S>| f(a.zip_low(b), a.zip_high(b));
+    let (a, b, c, d) = (both(r[0], r[8]), both(r[1], r[9]), both(r[2], r[10]), both(r[3], r[11]));
+    let (e, f, g, h) = (both(r[4], r[12]), both(r[5], r[13]), both(r[6], r[14]), both(r[7], r[15]));
+    let (a, b, c, d) = (both(a, e), both(b, f), both(c, g), both(d, h));
+    let (a, b) = (both(a, c), both(b, d));
+    both(a, b).to_array()
+}
+
 #[cfg(test)]
 mod tests {
     use fearless_simd::{Level, dispatch};
@@ -223,6 +260,24 @@ mod tests {
                 let found = found.map(|v| v.map(|x| x[lane].to_bits()));
                 assert_eq!(found, [u, v].map(|v| v.map(f32::to_bits)), "{vector:?}");
             }
+        }
+    }
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "arbitrary numbers")]
+    fn rows_are_reduced_in_their_order() {
+        let rng = &mut rng(5);
+        let rows: [[f32; WIDTH]; WIDTH] =
+            std::array::from_fn(|_| std::array::from_fn(|_| unit_vector(rng)[0] as f32));
+        let found = dispatch!(Level::new(), simd => {
+            let lanes = rows.map(|row| f32x16::load_array(simd, row));
+            (least_of_each(lanes), greatest_of_each(lanes), lanes.map(|lanes| sum(lanes)))
+        });
+        let fold = |f: fn(f32, f32) -> f32| rows.map(|row| row.into_iter().reduce(f).unwrap());
+        assert_eq!((found.0, found.1), (fold(f32::min), fold(f32::max)));
+        for (found, row) in found.2.iter().zip(rows) {
+            let expected: f64 = row.into_iter().map(f64::from).sum();
+            assert!((f64::from(*found) - expected).abs() < 1e-5, "{found}, {expected}");
         }
     }
 

@@ -50,7 +50,7 @@ impl OrientedBox {
 
     /// Returns the smallest box along `axes` that contains an interval on each axis, grown by the
     /// rounding error.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn spanned(axes: Axes, low: [f32; 3], high: [f32; 3], reach: f32) -> Self {
         let (mut middle, mut far) = ([0.0; 3], 0.0_f32);
         for k in 0..3 {
@@ -66,7 +66,7 @@ impl OrientedBox {
     }
 
     /// Returns the interval of the box along each of `axes`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn along(&self, axes: &Axes) -> [[f32; 2]; 3] {
         let mut intervals = [[0.0; 2]; 3];
         for (interval, axis) in intervals.iter_mut().zip(axes) {

@@ -41,7 +41,7 @@ impl Growth {
     }
 
     /// Does the same for a box with the intervals `own` along its axes.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn beyond(own: &[[f32; 2]; 3], low: [f32; 3], high: [f32; 3]) -> Self {
         let mut far = 0.0_f32;
         for k in 0..3 {

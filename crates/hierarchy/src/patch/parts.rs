@@ -8,37 +8,33 @@
 
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::change_both;
+use nearmiss_lanes::parallel::{Divide, Runs, change_both, change_together};
 use nearmiss_lanes::vector::dot;
-use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
+use nearmiss_lanes::wide::{along, greatest, greatest_of_each, least_of_each, load};
 
 use crate::bounds::boxes::{OrientedBox, ROUNDING};
 use crate::bounds::growth::Growth;
-use crate::point::disc::DiscRadii;
 use crate::point::kind::{SLAB, THICKNESS, ball, cell_radius, is_on_sheet, obstacle_ball};
-use crate::tree::topology::Topology;
+use crate::point::leaf_block::{DiscLanes, LeafBlock, LeafParts, WIDTH, runs};
+use crate::tree::topology::{FAN, MOST_LEAF_POINTS, Topology};
 
-const WIDTH: usize = PointBlock::WIDTH;
-
-/// The number of nodes that a thread takes at once.
+/// The number of bottoms that a thread takes at once.
 const AT_ONCE: usize = 16;
+
+/// The maximum number of blocks of points under a bottom.
+const MOST_BLOCKS: usize = FAN * MOST_LEAF_POINTS / WIDTH;
 
 /// Allowance for the relative rounding error of the extents of a cylinder.
 const GROWN: f32 = 1.0 + 1e-4;
 
-/// The parts of a block of points, side by side.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C, align(64))]
-pub(crate) struct PartBlock {
-    normal: [[f32; WIDTH]; 3],
-    radius: [f32; WIDTH],
-    disc: [f32; WIDTH],
+/// The parts of up to sixteen points of a leaf, side by side.
+#[derive(Debug, Clone, Copy)]
+struct PartLanes {
+    discs: DiscLanes,
     /// The greater radius of the balls of a point; 0 for points without.
     ball: [f32; WIDTH],
     /// The radius of the cylinder about the cell of a point on a sheet, and half its height; 0 for
@@ -47,78 +43,139 @@ pub(crate) struct PartBlock {
     slab: [f32; WIDTH],
 }
 
-/// The arrays that parts follow from.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Parts<'a> {
-    pub(crate) normals: &'a [[f32; 3]],
-    pub(crate) discs: DiscRadii<'a>,
-    /// The number of dense points, which come first.
-    pub(crate) dense: usize,
-}
+impl PartLanes {
+    const NONE: Self = Self {
+        discs: DiscLanes::NONE,
+        ball: [0.0; WIDTH],
+        cell: [0.0; WIDTH],
+        slab: [0.0; WIDTH],
+    };
 
-impl Parts<'_> {
-    /// Returns the parts of the points in block `number`.
-    pub(crate) fn block(&self, number: usize) -> PartBlock {
-        let Self { normals, discs, dense } = *self;
-        let mut block = PartBlock::zeroed();
-        let first = number * WIDTH;
-        for i in first..(first + WIDTH).min(normals.len()) {
-            let (lane, kind, radius) = (i - first, discs.codes[i].kind(), discs.radii[i]);
-            for k in 0..3 {
-                block.normal[k][lane] = normals[i][k];
-            }
-            block.radius[lane] = radius;
-            block.disc[lane] = discs.get(i);
-            let small = ball(kind, radius, discs.sampling_radius);
-            block.ball[lane] = small.max(obstacle_ball(i, dense, kind, radius));
+    #[inline(always)]
+    fn of(points: Range<usize>, parts: &LeafParts<'_>) -> Self {
+        let (dense, reach, ordinary) = (parts.dense, parts.discs.reach, parts.discs.sampling_radius);
+        let mut lanes = Self {
+            discs: parts.lanes(points.clone()),
+            ball: [0.0; WIDTH],
+            cell: [0.0; WIDTH],
+            slab: [0.0; WIDTH],
+        };
+        for lane in 0..WIDTH {
+            let i = points.start + lane.min(points.len() - 1);
+            let (kind, radius) = (parts.discs.codes[i].kind(), lanes.discs.radius[lane]);
+            lanes.ball[lane] = ball(kind, radius, ordinary).max(obstacle_ball(i, dense, kind, radius));
             if is_on_sheet(i, dense, kind) {
-                block.cell[lane] = cell_radius(radius, discs.reach) * GROWN;
-                block.slab[lane] = SLAB * radius * GROWN;
+                lanes.cell[lane] = cell_radius(radius, reach) * GROWN;
+                lanes.slab[lane] = SLAB * radius * GROWN;
             }
         }
-        block
+        lanes
     }
 }
 
-/// Replaces the box of each node above a `changed` leaf by one along its axes about the discs and balls
-/// of the node's points, with their greatest radius, and sets its growths to the enclosures of the
-/// surface and of the obstacle. The surface is within `beyond` of the points. O(n), and O(n log n) tests of
-/// `changed`.
-///
-/// The box of a node with at most four leaves is the smallest one. That of any other node is the
-/// smallest one about the boxes of the nodes with four leaves under it, which are small beside it.
-pub(crate) fn bound_parts(
+/// What is to be set of the *bottoms*, the nodes whose children are leaves, and of these leaves: their
+/// boxes, with axes that stay, and their growths. A tree of one leaf has one bottom, without arrays.
+#[derive(Debug)]
+pub(crate) struct Low<'a> {
+    pub(crate) topology: &'a Topology,
+    /// The number of the first bottom.
+    pub(crate) first: usize,
+    pub(crate) bottoms: (Runs<'a, OrientedBox>, Runs<'a, [Growth; 2]>),
+    pub(crate) leaves: (Runs<'a, OrientedBox>, Runs<'a, [Growth; 2]>, Runs<'a, LeafBlock>, Runs<'a, u8>),
+}
+
+impl Divide for Low<'_> {
+    fn divide(self, item: usize) -> (Self, Self) {
+        let Self { topology, first, bottoms, leaves } = self;
+        let leaf = leaves_under(topology, first + item).start - leaves_under(topology, first).start;
+        let (bottoms, leaves) = (bottoms.divide(item), leaves.divide(leaf));
+        (
+            Self { topology, first, bottoms: bottoms.0, leaves: leaves.0 },
+            Self { topology, first: first + item, bottoms: bottoms.1, leaves: leaves.1 },
+        )
+    }
+}
+
+/// Returns the leaves under a bottom, by its number.
+fn leaves_under(topology: &Topology, bottom: usize) -> Range<usize> {
+    let id = topology.first_bottom() + bottom;
+    if id < topology.inner() { topology.leaves_under(NodeId(id32(id))) } else { 0..topology.leaves() }
+}
+
+/// Replaces the box of each leaf by the smallest one along its axes about the discs and balls of its
+/// points, with their greatest radius, and sets its growths to the enclosures of the surface and of the
+/// obstacle. The surface is within `beyond` of the points. Does the same for the nodes whose children
+/// are leaves, and sets blocks and marks of the leaves. O(n).
+pub(crate) fn bound_leaves(
+    parts: &LeafParts<'_>,
+    beyond: f32,
+    low: Low<'_>,
+) {
+    let (topology, level, beyond) = (low.topology, Level::new(), beyond * GROWN);
+    let bottoms = (topology.inner() - topology.first_bottom()).max(1);
+    change_together(0..bottoms, AT_ONCE, low, &|items, low| {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || low.bound(simd, parts, beyond, items),
+        ));
+    });
+}
+
+impl Low<'_> {
+    #[inline(always)]
+    fn bound<S: Simd>(
+        self,
+        simd: S,
+        parts: &LeafParts<'_>,
+        beyond: f32,
+        items: Range<usize>,
+    ) {
+        let Self { topology, bottoms: (bottom_boxes, bottom_growths), leaves, .. } = self;
+        let (boxes, growths, blocks, marks) = leaves;
+        let mut lanes = [PartLanes::NONE; MOST_BLOCKS];
+        let first_leaf = leaves_under(topology, items.start).start;
+        for (place, item) in items.enumerate() {
+            let mut count = 0;
+            for leaf in leaves_under(topology, item) {
+                let (start, points) = (count, topology.points_of_leaf(leaf));
+                for points in runs(points) {
+                    lanes[count] = PartLanes::of(points, parts);
+                    count += 1;
+                }
+                let at = leaf - first_leaf;
+                let bounds = &mut boxes.elements[at];
+                growths.elements[at] = extents(simd, &lanes[start..count], &bounds.axes).bound(bounds, beyond);
+                let blocks = &mut blocks.elements[at * blocks.each..(at + 1) * blocks.each];
+                for (k, block) in blocks.iter_mut().enumerate() {
+                    *block = match lanes[start..count].get(k) {
+                        Some(lanes) => LeafBlock::of(simd, &lanes.discs, bounds),
+                        None => LeafBlock::new(bounds),
+                    };
+                }
+                marks.elements[at] = parts.marks(topology, leaf, bounds);
+            }
+            if let Some(bounds) = bottom_boxes.elements.get_mut(place) {
+                let extents = extents(simd, &lanes[..count], &bounds.axes);
+                bottom_growths.elements[place] = extents.bound(bounds, beyond);
+            }
+        }
+    }
+}
+
+/// Replaces the box of each node above the bottoms by the smallest one along its axes about the boxes of
+/// the bottoms under it, which are small beside it, and sets its growths to their enclosures. `boxes` and
+/// `growths` are those of all nodes. O(n log n).
+pub(crate) fn bound_above(
     topology: &Topology,
     (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]]),
-    (points, parts): (&[PointBlock], &[PartBlock]),
-    beyond: f32,
-    changed: impl Fn(usize) -> bool + Sync + Send,
 ) {
-    let is_changed = |id: usize| topology.leaves_under(NodeId(id32(id))).any(&changed);
-    let (level, beyond, small) = (Level::new(), beyond * GROWN, topology.first_bottom());
-    let (large_boxes, boxes) = boxes.split_at_mut(small);
-    let (large_growths, growths) = growths.split_at_mut(small);
-    change_both(boxes, growths, AT_ONCE, |number, bounds, growths| {
-        if !is_changed(small + number) {
-            return;
-        }
-        let range = topology.points(NodeId(id32(small + number)));
-        let Extents { discs, cells, points, reach } = dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
-            || extents(simd, (points, parts), range, &bounds.axes),
-        ));
-        *bounds = OrientedBox::spanned(bounds.axes, discs[0], discs[1], reach);
-        let own = bounds.along(&bounds.axes);
-        let surface = Growth::beyond(&own, points[0].map(|x| x - beyond), points[1].map(|x| x + beyond));
-        *growths = [surface, Growth::beyond(&own, cells[0], cells[1])];
-    });
+    let (level, first) = (Level::new(), topology.first_bottom());
+    let (above, boxes) = boxes.split_at_mut(first);
+    let (growths_above, growths) = growths.split_at_mut(first);
     let (boxes, growths): (&[_], &[_]) = (boxes, growths);
-    change_both(large_boxes, large_growths, 1, |id, bounds, of_node| {
-        if !is_changed(id) {
-            return;
-        }
+    change_both(above, growths_above, 1, |id, bounds, of_node| {
         let below = topology.bottoms_under(NodeId(id32(id)));
-        let below = below.start - small..below.end - small;
+        let below = below.start - first..below.end - first;
         (*bounds, *of_node) = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || about(&bounds.axes, (&boxes[below.clone()], &growths[below])),
@@ -174,32 +231,37 @@ struct Extents {
     reach: f32,
 }
 
+impl Extents {
+    /// Sets a box along the same axes, and returns its growths. The surface is within `beyond` of the
+    /// points.
+    #[inline(always)]
+    fn bound(&self, bounds: &mut OrientedBox, beyond: f32) -> [Growth; 2] {
+        let Self { discs, cells, points, reach } = self;
+        *bounds = OrientedBox::spanned(bounds.axes, discs[0], discs[1], *reach);
+        let own = bounds.along(&bounds.axes);
+        let (mut low, mut high) = (points[0], points[1]);
+        for k in 0..3 {
+            (low[k], high[k]) = (low[k] - beyond, high[k] + beyond);
+        }
+        [Growth::beyond(&own, low, high), Growth::beyond(&own, cells[0], cells[1])]
+    }
+}
+
 #[inline(always)]
-fn extents<S: Simd>(
-    simd: S,
-    (points, parts): (&[PointBlock], &[PartBlock]),
-    range: Range<usize>,
-    axes: &[[f32; 3]; 3],
-) -> Extents {
+fn extents<S: Simd>(simd: S, all: &[PartLanes], axes: &[[f32; 3]; 3]) -> Extents {
     let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
     let mut low = [[most; 3]; 3];
     let mut high = [[none; 3]; 3];
     let mut reach = f32x16::splat(simd, 0.0);
     let zero = f32x16::splat(simd, 0.0);
-    for number in range.start / WIDTH..range.end.div_ceil(WIDTH) {
-        let block = &parts[number];
-        let lanes = |row: &[f32; WIDTH]| f32x16::load_array_ref(simd, row);
-        let (position, normal) = (load(simd, &points[number].position), load(simd, &block.normal));
-        let (disc, ball) = (lanes(&block.disc), lanes(&block.ball));
-        let (cell, slab) = (lanes(&block.cell), lanes(&block.slab));
+    for PartLanes { discs: DiscLanes { position, normal, radius, disc, .. }, ball, cell, slab } in all {
+        let (position, normal) = (load(simd, position), load(simd, normal));
+        let (disc, ball) = (f32x16::load_array_ref(simd, disc), f32x16::load_array_ref(simd, ball));
+        let (cell, slab) = (f32x16::load_array_ref(simd, cell), f32x16::load_array_ref(simd, slab));
         let [u, v, w] = axes;
         let cosines = [along(normal, *u), along(normal, *v), along(normal, *w)];
         let squares = [cosines[0] * cosines[0], cosines[1] * cosines[1], cosines[2] * cosines[2]];
-        let own = lanes_of(number, &range);
-        let is_whole = own == (1 << WIDTH) - 1;
-        let inside = mask32x16::from_bitmask(simd, u64::from(own));
-        let radius = lanes(&block.radius);
-        reach = reach.max(simd.select_f32x16(inside, radius, zero));
+        reach = reach.max(f32x16::load_array_ref(simd, radius));
         for k in 0..3 {
             // The axes are orthonormal. This does not cancel as √(1 − (n·axis)²) does.
             let sine = (squares[(k + 1) % 3] + squares[(k + 2) % 3]).sqrt();
@@ -207,23 +269,24 @@ fn extents<S: Simd>(
                 [(disc * (sine + THICKNESS)).max(ball), cell * sine + slab * cosines[k].abs(), zero];
             let middle = along(position, axes[k]);
             for j in 0..3 {
-                let (mut least, mut greatest) = (middle - spreads[j], middle + spreads[j]);
-                if !is_whole {
-                    least = simd.select_f32x16(inside, least, most);
-                    greatest = simd.select_f32x16(inside, greatest, none);
-                }
-                low[j][k] = low[j][k].min(least);
-                high[j][k] = high[j][k].max(greatest);
+                low[j][k] = low[j][k].min(middle - spreads[j]);
+                high[j][k] = high[j][k].max(middle + spreads[j]);
             }
         }
     }
-    let mut found = [[[0.0; 3]; 2]; 3];
+    let (low, high) = (least_of_each(rows(&low)), greatest_of_each(rows(&high)));
+    let mut extents = [[[0.0; 3]; 2]; 3];
     for j in 0..3 {
         for k in 0..3 {
-            found[j][0][k] = least(low[j][k], f32::INFINITY);
-            found[j][1][k] = greatest(high[j][k], f32::NEG_INFINITY);
+            (extents[j][0][k], extents[j][1][k]) = (low[3 * j + k], high[3 * j + k]);
         }
     }
-    let [discs, cells, points] = found;
+    let [discs, cells, points] = extents;
     Extents { discs, cells, points, reach: greatest(reach, 0.0) }
+}
+
+/// Returns nine rows, and the last one again.
+#[inline(always)]
+fn rows<S: Simd>([[a, b, c], [d, e, f], [g, h, i]]: &[[f32x16<S>; 3]; 3]) -> [f32x16<S>; WIDTH] {
+    [*a, *b, *c, *d, *e, *f, *g, *h, *i, *i, *i, *i, *i, *i, *i, *i]
 }

@@ -141,7 +141,7 @@ pub(crate) struct Known<'a> {
 pub(crate) fn fits(
     index: &Index<'_>,
     positions: &[[f32; 3]],
-    (radii, spacings): (&[f32], &[Spacing]),
+    spacings: &[Spacing],
     gaps: bool,
     work: &Workspace,
 ) -> Result<Room<Fit>, WorkError> {
@@ -150,11 +150,10 @@ pub(crate) fn fits(
     collect_into(&mut all, topology.leaves(), |leaves| {
         let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
         for number in leaves {
-            let (points, about) = leaf(index, number);
-            let spacings = &spacings[points.clone()];
-            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points], about: &about };
+            let points = topology.points_of_leaf(number);
+            let (positions, spacings) = (&positions[points.clone()], &spacings[points]);
             let look = |i: usize| spacings[i].look();
-            dispatch!(level, simd => leaf.fit(simd, index, (look, gaps), &mut scratch, &mut fits));
+            dispatch!(level, simd => fit(simd, index, positions, (look, gaps), &mut scratch, &mut fits));
         }
         fits
     });
@@ -165,7 +164,6 @@ pub(crate) fn fits(
 pub(crate) fn fits_of(
     index: &Index<'_>,
     positions: &[[f32; 3]],
-    radii: &[f32],
     looks: &(impl Fn(usize) -> Look + Sync + Send),
     leaves: &[u32],
 ) -> Vec<Fit> {
@@ -173,11 +171,10 @@ pub(crate) fn fits_of(
     let some = chunks(leaves, |leaves| {
         let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
         for number in leaves {
-            let (points, about) = leaf(index, *number as usize);
-            let first = points.start;
-            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points], about: &about };
+            let points = index.tree.topology.points_of_leaf(*number as usize);
+            let (first, positions) = (points.start, &positions[points]);
             let look = |i: usize| looks(first + i);
-            dispatch!(level, simd => leaf.fit(simd, index, (look, true), &mut scratch, &mut fits));
+            dispatch!(level, simd => fit(simd, index, positions, (look, true), &mut scratch, &mut fits));
         }
         fits
     });
@@ -290,57 +287,6 @@ struct Leaf<'a> {
 }
 
 impl Leaf<'_> {
-    /// Appends the fits of all points to `found`. `look` returns the appearance of a point; `gaps` tells
-    /// whether gaps are wanted.
-    #[inline(always)]
-    fn fit<S: Simd>(
-        &self,
-        simd: S,
-        index: &Index<'_>,
-        (look, gaps): (impl Fn(usize) -> Look, bool),
-        scratch: &mut LeafScratch,
-        found: &mut Vec<Fit>,
-    ) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let LeafScratch { locality, blocks, near, halves, fits, lists, ends, .. } = scratch;
-                let middle = self.about.centre;
-                let own = self.positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
-                let own = own.fold(0.0, f32::max).sqrt();
-                locality.collect_within(simd, index, middle, own * GROWN);
-                locality.gather_balls(index);
-                blocks.clear();
-                blocks.extend(locality.blocks.iter().map(|&block| index.blocks[block as usize]));
-                fits.clear();
-                lists.clear();
-                ends.clear();
-                for p in self.positions {
-                    let x = Centre::new(p.map(f64::from));
-                    let mut sums = Neighbourhood::new(simd, index.plan, &x);
-                    let near = locality.supporting(simd, x.rounded(), 0.0, near);
-                    lists.extend_from_slice(near);
-                    ends.push(lists.len());
-                    sums.offer_all(simd, blocks, near, halves);
-                    fits.push(sums.moments(simd));
-                }
-                let first = found.len();
-                Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| {
-                    found.push(fitted(&at, look(i)));
-                });
-                if gaps {
-                    let mut start = 0;
-                    for (i, fit) in found[first..].iter_mut().enumerate() {
-                        let near = lists[start..ends[i]].iter().map(|&place| &blocks[place as usize]);
-                        let gap = widest_gap(simd, self.positions[i], fit.normal, near);
-                        fit.code |= (gap + 1) << GAP;
-                        start = ends[i];
-                    }
-                }
-            },
-        );
-    }
-
     /// Computes the discs of the points, narrowed at borders, and the bounds of the leaf's part of
     /// the surface and of the obstacle.
     #[inline(always)]
@@ -394,6 +340,74 @@ impl Leaf<'_> {
             },
         )
     }
+}
+
+/// Appends the fits of the points of a leaf to `found`. `look` returns the appearance of a point; `gaps` tells
+/// whether gaps are wanted.
+#[inline(always)]
+fn fit<S: Simd>(
+    simd: S,
+    index: &Index<'_>,
+    positions: &[[f32; 3]],
+    (look, gaps): (impl Fn(usize) -> Look, bool),
+    scratch: &mut LeafScratch,
+    found: &mut Vec<Fit>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let LeafScratch { locality, blocks, near, halves, fits, lists, ends, .. } = scratch;
+            let middle = middle(positions);
+            let own = positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
+            let own = own.fold(0.0, f32::max).sqrt();
+            locality.collect_within(simd, index, middle, own * GROWN);
+            locality.gather_balls(index);
+            blocks.clear();
+            blocks.extend(locality.blocks.iter().map(|&block| index.blocks[block as usize]));
+            fits.clear();
+            lists.clear();
+            ends.clear();
+            for p in positions {
+                let x = Centre::new(p.map(f64::from));
+                let mut sums = Neighbourhood::new(simd, index.plan, &x);
+                let near = locality.supporting(simd, x.rounded(), 0.0, near);
+                lists.extend_from_slice(near);
+                ends.push(lists.len());
+                sums.offer_all(simd, blocks, near, halves);
+                fits.push(sums.moments(simd));
+            }
+            let first = found.len();
+            Moments::evaluate_all(simd, index.plan, positions, fits, |i, at| {
+                found.push(fitted(&at, look(i)));
+            });
+            if gaps {
+                let mut start = 0;
+                for (i, fit) in found[first..].iter_mut().enumerate() {
+                    let near = lists[start..ends[i]].iter().map(|&place| &blocks[place as usize]);
+                    let gap = widest_gap(simd, positions[i], fit.normal, near);
+                    fit.code |= (gap + 1) << GAP;
+                    start = ends[i];
+                }
+            }
+        },
+    );
+}
+
+/// Returns the centre of the upright box about some points.
+#[inline(always)]
+fn middle(points: &[[f32; 3]]) -> [f32; 3] {
+    let (mut low, mut high) = (points[0], points[0]);
+    for p in points {
+        for k in 0..3 {
+            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+        }
+    }
+    let mut middle = low;
+    for k in 0..3 {
+        middle[k] = 0.5 * low[k] + 0.5 * high[k];
+    }
+    middle
 }
 
 /// Returns the fit of a point from f there.

@@ -83,6 +83,54 @@ pub(crate) struct Index<'a> {
     pub(crate) lists: &'a [NeighbourList],
     pub(crate) listed: &'a [u32],
     pub(crate) plan: &'a SurfacePlan,
+    /// The balls above the groups, where the boxes of nodes are not known yet.
+    pub(crate) supports: Option<&'a Supports>,
+}
+
+/// The balls around groups and their support, in levels: a block of the first level has the balls of
+/// sixteen groups, a block of the next one the balls around sixteen blocks below. The last level has one
+/// block. Without levels there is one group.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Supports {
+    pub(crate) levels: Vec<Vec<PointBlock>>,
+}
+
+impl Supports {
+    /// The maximum number of levels above 2³² points.
+    const MOST_LEVELS: usize = 6;
+
+    /// Finds the groups whose support may come within `distance` of `x`, ascending.
+    #[inline(always)]
+    fn collect<S: Simd>(&self, simd: S, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
+        let (mut lanes, mut counts) = ([[0; PointBlock::WIDTH]; Self::MOST_LEVELS], [0; Self::MOST_LEVELS]);
+        let top = self.levels.len();
+        let below = |level: usize, id: u32, lanes: &mut [u32; PointBlock::WIDTH]| {
+            let count =
+                self.levels[level][id as usize].supporting(simd, x, distance, id * id32(PointBlock::WIDTH), lanes);
+            // The last one is taken first.
+            lanes[..count].reverse();
+            count
+        };
+        if top == 0 {
+            return found.push(0);
+        }
+        let mut level = top - 1;
+        counts[level] = below(level, 0, &mut lanes[level]);
+        while level < top {
+            let Some(left) = counts[level].checked_sub(1) else {
+                level += 1;
+                continue;
+            };
+            counts[level] = left;
+            let id = lanes[level][left];
+            if level == 0 {
+                found.push(id);
+            } else {
+                level -= 1;
+                counts[level] = below(level, id, &mut lanes[level]);
+            }
+        }
+    }
 }
 
 impl<'a> Index<'a> {
@@ -92,7 +140,7 @@ impl<'a> Index<'a> {
         (blocks, groups): (&'a [PointBlock], &'a [PointBlock]),
         plan: &'a SurfacePlan,
     ) -> Self {
-        Self { tree, blocks, groups, lists: &[], listed: &[], plan }
+        Self { tree, blocks, groups, lists: &[], listed: &[], plan, supports: None }
     }
 }
 
@@ -220,6 +268,9 @@ impl<'a> Index<'a> {
     #[inline(always)]
     pub(crate) fn collect_by<S: Simd>(&self, simd: S, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
         found.clear();
+        if let Some(supports) = self.supports {
+            return supports.collect(simd, x, distance * GROWN, found);
+        }
         // The visitor never breaks.
         let mut groups = Groups { tree: &self.tree, plan: self.plan, distance, found, next: 0 };
         let _whole = self.tree.descend_to_by(simd, x, &mut groups);

@@ -1,11 +1,12 @@
 //! The data that leaves are compared by, in one place. A query rarely finds its leaves in the
 //! cache, and would wait for each separate piece of memory.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i16x16};
 use nearmiss_lanes::parallel::{change_each, fill};
-use nearmiss_lanes::vector::sub;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::point::disc::DiscRadii;
@@ -13,7 +14,7 @@ use crate::point::kind::is_on_sheet;
 use crate::tree::topology::Topology;
 
 /// The number of lanes of a block.
-const WIDTH: usize = 16;
+pub(crate) const WIDTH: usize = 16;
 
 /// The number of steps between 0 and 1 in a component of a unit vector.
 const STEPS: f32 = 32767.0;
@@ -65,12 +66,31 @@ impl LeafBlock {
     /// If there is no such lane.
     pub fn set(&mut self, lane: usize, position: [f32; 3], normal: [f32; 3], disc: f32) {
         let scale = self.steps_per_length();
-        let offset = sub(position, self.centre);
+        let offset = [0, 1, 2].map(|k| position[k] - self.centre[k]);
         self.discs[lane] = nearest(disc * scale);
         for k in 0..3 {
             self.positions[k][lane] = nearest(offset[k] * scale);
             self.normals[k][lane] = nearest(normal[k] * STEPS);
         }
+    }
+
+    /// Creates a block of the points in `lanes`. `bounds` must contain their discs.
+    #[inline(always)]
+    pub(crate) fn of<S: Simd>(simd: S, lanes: &DiscLanes, bounds: &OrientedBox) -> Self {
+        let mut block = Self::new(bounds);
+        let scale = block.steps_per_length();
+        for k in 0..3 {
+            block.positions[k] = in_steps(simd, &lanes.position[k], bounds.centre[k], scale);
+            block.normals[k] = in_steps(simd, &lanes.normal[k], 0.0, STEPS);
+        }
+        block.discs = in_steps(simd, &lanes.disc, 0.0, scale);
+        for lane in lanes.count..WIDTH {
+            block.discs[lane] = 0;
+            for k in 0..3 {
+                (block.positions[k][lane], block.normals[k][lane]) = (0, 0);
+            }
+        }
+        block
     }
 
     #[inline(always)]
@@ -143,14 +163,53 @@ fn nearest(x: f32) -> i16 {
     (x + 0.5_f32.copysign(x)) as i16
 }
 
-/// Returns numbers times `scale`, each rounded to the nearest integer.
+/// Returns the distances of numbers from `origin` times `scale`, each rounded to the nearest integer.
 #[inline(always)]
-fn in_steps(numbers: &[f32; WIDTH], scale: f32) -> [i16; WIDTH] {
-    let mut steps = [0; WIDTH];
-    for lane in 0..WIDTH {
-        steps[lane] = nearest(numbers[lane] * scale);
+fn in_steps<S: Simd>(simd: S, numbers: &[f32; WIDTH], origin: f32, scale: f32) -> [i16; WIDTH] {
+    let scaled = (f32x16::load_array_ref(simd, numbers) - origin) * scale;
+    let rounded = scaled + f32x16::splat(simd, 0.5).copysign(scaled);
+    let (low, high) = simd.cvt_i32_precise_f32x16(rounded).split();
+    low.saturating_narrow(high).to_array()
+}
+
+/// Returns the first sixteen items, the last one repeated if there are fewer.
+#[inline(always)]
+fn repeated<T: Copy>(items: &[T]) -> [T; WIDTH] {
+    if let Some(items) = items.first_chunk() {
+        return *items;
     }
-    steps
+    let mut lanes = [items[items.len() - 1]; WIDTH];
+    lanes[..items.len()].copy_from_slice(items);
+    lanes
+}
+
+/// Returns the points of a leaf in runs of sixteen; the last may be shorter.
+#[inline(always)]
+pub(crate) fn runs(points: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    points.clone().step_by(WIDTH).map(move |first| first..points.end.min(first + WIDTH))
+}
+
+/// Up to sixteen points of a leaf with their discs, one in each lane. Unused lanes repeat the last point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DiscLanes {
+    pub(crate) position: [[f32; WIDTH]; 3],
+    pub(crate) normal: [[f32; WIDTH]; 3],
+    /// The local radii.
+    pub(crate) radius: [f32; WIDTH],
+    /// The radii of the discs.
+    pub(crate) disc: [f32; WIDTH],
+    /// The number of points.
+    pub(crate) count: usize,
+}
+
+impl DiscLanes {
+    pub(crate) const NONE: Self = Self {
+        position: [[0.0; WIDTH]; 3],
+        normal: [[0.0; WIDTH]; 3],
+        radius: [0.0; WIDTH],
+        disc: [0.0; WIDTH],
+        count: 0,
+    };
 }
 
 #[inline(always)]
@@ -200,7 +259,7 @@ impl LeafParts<'_> {
             let bounds = bounds(number / blocks_a_leaf);
             *block = dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || self.block(topology, number, &bounds),
+                || self.block(simd, topology, number, &bounds),
             ));
         });
         fill(marks, |leaf| self.marks(topology, leaf, &bounds(leaf)));
@@ -208,28 +267,34 @@ impl LeafParts<'_> {
 
     /// Returns block `number`, counted over all leaves. `bounds` is the box of its leaf.
     #[inline(always)]
-    pub(crate) fn block(&self, topology: &Topology, number: usize, bounds: &OrientedBox) -> LeafBlock {
+    pub(crate) fn block<S: Simd>(
+        &self,
+        simd: S,
+        topology: &Topology,
+        number: usize,
+        bounds: &OrientedBox,
+    ) -> LeafBlock {
         let blocks_a_leaf = Self::blocks_a_leaf(topology);
         let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
-        let points = topology.points_of_leaf(leaf);
-        let points = points.start + part * WIDTH..points.end.min(points.start + (part + 1) * WIDTH);
-        let (mut positions, mut normals) = ([[0.0; WIDTH]; 3], [[0.0; WIDTH]; 3]);
-        let mut discs = [0.0; WIDTH];
-        for (lane, i) in points.clone().enumerate() {
-            let (offset, normal) = (sub(self.positions[i], bounds.centre), self.normals[i]);
+        let mut parts = runs(topology.points_of_leaf(leaf)).skip(part);
+        parts.next().map_or(LeafBlock::new(bounds), |points| LeafBlock::of(simd, &self.lanes(points), bounds))
+    }
+
+    /// Returns up to sixteen points of a leaf, at least one.
+    #[inline(always)]
+    pub(crate) fn lanes(&self, points: Range<usize>) -> DiscLanes {
+        let positions = repeated(&self.positions[points.clone()]);
+        let normals = repeated(&self.normals[points.clone()]);
+        let (codes, radii) = (repeated(&self.discs.codes[points.clone()]), repeated(&self.discs.radii[points.clone()]));
+        let mut lanes = DiscLanes { radius: radii, count: points.len(), ..DiscLanes::NONE };
+        for lane in 0..WIDTH {
             for k in 0..3 {
-                (positions[k][lane], normals[k][lane]) = (offset[k], normal[k]);
+                lanes.position[k][lane] = positions[lane][k];
+                lanes.normal[k][lane] = normals[lane][k];
             }
-            discs[lane] = self.discs.get(i);
+            lanes.disc[lane] = codes[lane].disc(radii[lane], self.discs.reach, self.discs.sampling_radius);
         }
-        let mut block = LeafBlock::new(bounds);
-        let scale = block.steps_per_length();
-        for k in 0..3 {
-            block.positions[k] = in_steps(&positions[k], scale);
-            block.normals[k] = in_steps(&normals[k], STEPS);
-        }
-        block.discs = in_steps(&discs, scale);
-        block
+        lanes
     }
 
     /// Returns the marks of a leaf; `bounds` is its box.
@@ -258,7 +323,7 @@ impl<'a> Leaves<'a> {
     /// Returns the points of a leaf, by its number.
     #[inline]
     #[must_use]
-    pub fn points(&self, leaf: usize) -> std::ops::Range<usize> {
+    pub fn points(&self, leaf: usize) -> Range<usize> {
         self.topology.points_of_leaf(leaf)
     }
 

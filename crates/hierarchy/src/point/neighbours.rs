@@ -16,12 +16,12 @@ use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{change_each, fill, in_order};
 use nearmiss_lanes::vector::{dot, sub};
-use nearmiss_lanes::wide::{greatest, product, seen_from};
+use nearmiss_lanes::wide::{greatest, product, seen_from, sum};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::SurfacePlan;
 
 use crate::bounds::boxes::ROUNDING;
-use crate::point::gather::{GROWN, Index, NeighbourList};
+use crate::point::gather::{GROWN, Index, NeighbourList, Supports};
 
 /// The maximum length of a list. A block with more neighbours has no list, and f near it is found
 /// by descent. Blocks on surfaces have about seven. Where sparse and dense regions meet, or
@@ -89,26 +89,39 @@ fn fill_groups(blocks: &[PointBlock], groups: &mut [PointBlock], steps: u8) {
     });
 }
 
+/// Returns the levels of balls above `groups` in motion.
+pub(crate) fn supports(groups: &[PointBlock]) -> Supports {
+    let mut levels: Vec<Vec<PointBlock>> = Vec::new();
+    while let below = levels.last().map_or(groups, |level| level)
+        && below.len() > 1
+    {
+        let mut above = vec![PointBlock::EMPTY; below.len().div_ceil(PointBlock::WIDTH)];
+        groups_in_motion(below, &mut above);
+        levels.push(above);
+    }
+    Supports { levels }
+}
+
 /// Returns a ball that contains the support balls of all points of a block.
 #[inline(always)]
 fn ball<S: Simd>(simd: S, block: &PointBlock, steps: u8) -> ([f32; 3], f32) {
     let PointBlock { position: [x, y, z], support_radius, .. } = block;
-    let (mut sum, mut count) = ([0.0; 3], 0.0);
-    for i in 0..PointBlock::WIDTH {
-        if support_radius[i] > 0.0 {
-            (sum, count) = ([sum[0] + x[i], sum[1] + y[i], sum[2] + z[i]], count + 1.0);
-        }
-    }
-    let mut centre = [sum[0] / count, sum[1] / count, sum[2] / count];
-    // The smallest ball of balls: from the mean, ever smaller steps towards the point whose support
-    // ball extends furthest.
     let support_radii = f32x16::load_array_ref(simd, support_radius);
     let is_there: mask32x16<S> = support_radii.simd_gt(0.0);
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let count = sum(simd.select_f32x16(is_there, one, zero));
+    let mut centre = [0.0; 3];
+    for k in 0..3 {
+        let row = f32x16::load_array_ref(simd, &block.position[k]);
+        centre[k] = sum(simd.select_f32x16(is_there, row, zero)) / count;
+    }
+    // The smallest ball of balls: from the mean, ever smaller steps towards the point whose support
+    // ball extends furthest.
     let mut best = (centre, f32::INFINITY);
     for step in 2..2 + steps {
         let d = seen_from(simd, &block.position, centre);
         let outer = product(d, d).sqrt() + support_radii;
-        let outer = simd.select_f32x16(is_there, outer, f32x16::splat(simd, 0.0));
+        let outer = simd.select_f32x16(is_there, outer, zero);
         let radius = greatest(outer, 0.0);
         if radius < best.1 {
             best = (centre, radius);

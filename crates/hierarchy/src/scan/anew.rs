@@ -60,11 +60,7 @@ pub(crate) fn fitted_anew(
     let positions = OnceLock::from(Array::from(positions));
     let mut scan = PointHierarchy { meta, plan, topology, arrays, positions };
     resize(&mut scan, topology);
-    closing.reserve(&scan);
-    closing.support(&mut scan);
-    closing.turn(&scan);
-    closing.bound(&mut scan);
-    closing.finish(&mut scan);
+    closing.close(&mut scan);
     Ok(scan)
 }
 

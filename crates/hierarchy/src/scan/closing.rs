@@ -3,14 +3,14 @@
 
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{both, change_each, fill};
+use nearmiss_lanes::parallel::{both, change_each, fill, runs};
 use nearmiss_store::Array;
 use nearmiss_surface::{EigenBlock, SurfacePlan};
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
 use crate::patch::covering::Covering;
-use crate::patch::parts::{PartBlock, Parts, bound_parts};
+use crate::patch::parts::{Low, bound_above, bound_leaves};
 use crate::point::disc::DiscRadii;
 use crate::point::gather::NeighbourList;
 use crate::point::leaf_block::LeafParts;
@@ -27,7 +27,6 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// Memory that frames reuse.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Closing {
-    parts: Vec<PartBlock>,
     boxes: Vec<OrientedBox>,
     growths: Vec<[Growth; 2]>,
     spreads: Vec<Spread>,
@@ -39,7 +38,6 @@ impl Closing {
     /// Takes as much memory as a scan needs.
     pub(crate) fn reserve(&mut self, scan: &PointHierarchy) {
         let nodes = scan.topology.len();
-        self.parts.resize(scan.arrays.blocks.len(), bytemuck::Zeroable::zeroed());
         self.boxes.resize(nodes, OrientedBox::default());
         self.growths.resize(nodes, Default::default());
     }
@@ -63,71 +61,72 @@ impl Closing {
         }
     }
 
-    /// Finds the axes of all nodes.
-    pub(crate) fn turn(&mut self, scan: &PointHierarchy) {
+    /// Does all steps for points that have just been fitted.
+    pub(crate) fn close(&mut self, scan: &mut PointHierarchy) {
+        self.reserve(scan);
+        self.support(scan);
+        self.bound(scan);
+    }
+
+    /// Bounds all nodes, and sets all that depends on boxes.
+    pub(crate) fn bound(&mut self, scan: &mut PointHierarchy) {
         let memory = (&mut self.spreads, &mut self.solved);
         principal_axes(scan.positions(), &scan.topology, &mut self.boxes, memory);
+        self.bound_leaves(scan);
+        self.finish(scan);
     }
 
-    /// Fits boxes and enclosures of all nodes along the axes.
-    pub(crate) fn bound(&mut self, scan: &mut PointHierarchy) {
-        self.bound_above(scan, |_| true);
-    }
-
-    /// Fits the boxes and enclosures of the `changed` leaves and of the nodes above them. Those of all
-    /// other nodes must be up to date.
-    pub(crate) fn bound_above(
-        &mut self,
-        scan: &mut PointHierarchy,
-        changed: impl Fn(usize) -> bool + Sync + Send,
-    ) {
-        let PointHierarchy { meta, plan, topology, arrays, .. } = scan;
-        let Self { parts, boxes, growths, .. } = self;
-        let discs = DiscRadii {
-            codes: &arrays.codes,
-            radii: &arrays.radii,
-            reach: meta.reach,
-            sampling_radius: meta.sampling_radius,
-        };
-        let of_points = Parts { normals: &arrays.normals, discs, dense: meta.dense as usize };
-        let leaf_of = |point: usize| point.min(of_points.normals.len() - 1) / topology.leaf_size();
-        change_each(parts, WIDTH, |number, part| {
-            if (leaf_of(number * WIDTH)..=leaf_of((number + 1) * WIDTH - 1)).any(&changed) {
-                *part = of_points.block(number);
-            }
-        });
-        let greatest = arrays.radii.iter().copied().fold(0.0, f32::max);
-        let beyond = 0.5 * plan.support_radius(greatest);
-        bound_parts(topology, (boxes, growths), (&arrays.blocks, parts), beyond, changed);
-        siblings(topology, boxes, arrays.siblings.to_mut());
-        reaches(topology, boxes, arrays.reaches.to_mut());
-        let growths: &[[Growth; 2]] = growths;
-        growths_of_siblings(topology, |id| growths[id][0], arrays.surface_growths.to_mut());
-        growths_of_siblings(topology, |id| growths[id][1], arrays.obstacle_growths.to_mut());
-        meta.root = Root { bounds: boxes[NodeId::ROOT.index()], growths: growths[NodeId::ROOT.index()] };
-    }
-
-    /// Computes everything that depends on boxes.
-    pub(crate) fn finish(&self, scan: &mut PointHierarchy) {
+    /// Fits boxes and enclosures along the axes to leaves and to the nodes whose children are leaves, and
+    /// sets the records of leaves.
+    fn bound_leaves(&mut self, scan: &mut PointHierarchy) {
         // Unpacks the positions of a scan from a file.
         let _unpacked = scan.positions();
+        let PointHierarchy { meta, plan, topology, arrays, positions } = scan;
+        let Self { boxes, growths, .. } = self;
+        let parts = LeafParts {
+            positions: positions.get().map_or(&[], |positions| positions),
+            normals: &arrays.normals,
+            discs: DiscRadii {
+                codes: &arrays.codes,
+                radii: &arrays.radii,
+                reach: meta.reach,
+                sampling_radius: meta.sampling_radius,
+            },
+            dense: meta.dense as usize,
+        };
+        let greatest = arrays.radii.iter().copied().fold(0.0, f32::max);
+        let beyond = 0.5 * plan.support_radius(greatest);
+        let (bottoms, leaves) = (topology.first_bottom(), topology.inner());
+        let (boxes, leaf_boxes) = boxes.split_at_mut(leaves);
+        let (growths, leaf_growths) = growths.split_at_mut(leaves);
+        let blocks = runs(arrays.leaf_blocks.to_mut(), LeafParts::blocks_a_leaf(topology));
+        let low = Low {
+            topology,
+            first: 0,
+            bottoms: (runs(&mut boxes[bottoms..], 1), runs(&mut growths[bottoms..], 1)),
+            leaves: (runs(leaf_boxes, 1), runs(leaf_growths, 1), blocks, runs(arrays.marks.to_mut(), 1)),
+        };
+        bound_leaves(&parts, beyond, low);
+    }
+
+    /// Bounds the other nodes, and sets all that depends on boxes.
+    fn finish(&mut self, scan: &mut PointHierarchy) {
         let PointHierarchy { meta, topology, arrays, positions, .. } = scan;
         let positions: &[[f32; 3]] = positions.get().map_or(&[], |positions| positions);
         let (normals, codes, radii): (&[_], &[_], &[_]) = (&arrays.normals, &arrays.codes, &arrays.radii);
-        let (reach, sampling_radius) = (meta.reach, meta.sampling_radius);
-        let parts = LeafParts {
-            positions,
-            normals,
-            discs: DiscRadii { codes, radii, reach, sampling_radius },
-            dense: meta.dense as usize,
+        let Self { boxes, growths, .. } = self;
+        let bound = || {
+            spacings(topology, radii, arrays.coverings.to_mut());
+            bound_above(topology, (boxes, growths));
+            let (boxes, growths): (&[_], &[[Growth; 2]]) = (boxes, growths);
+            siblings(topology, boxes, arrays.siblings.to_mut());
+            reaches(topology, boxes, arrays.reaches.to_mut());
+            growths_of_siblings(topology, |id| growths[id][0], arrays.surface_growths.to_mut());
+            growths_of_siblings(topology, |id| growths[id][1], arrays.obstacle_growths.to_mut());
+            Root { bounds: boxes[NodeId::ROOT.index()], growths: growths[NodeId::ROOT.index()] }
         };
-        let of_leaf = |leaf: usize| self.boxes[topology.leaf(leaf).index()];
-        let leaves = (arrays.leaf_blocks.to_mut(), arrays.marks.to_mut());
-        let (identity, ()) = both(
-            || identity(meta, positions, codes, radii, Some(normals)),
-            || parts.fill(topology, of_leaf, leaves),
-        );
-        spacings(topology, radii, arrays.coverings.to_mut());
+        let (identity, root) = both(|| identity(meta, positions, codes, radii, Some(normals)), bound);
+        scan.meta.root = root;
         scan.meta.outline = scan.outlined_as(identity);
     }
 }

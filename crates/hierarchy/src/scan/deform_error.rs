@@ -1,5 +1,6 @@
 //! Why new positions cannot replace those of a deforming mesh or scan.
 
+use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::{Aabb, CloudError};
 use nearmiss_lanes::parallel::both;
 use thiserror::Error;
@@ -108,13 +109,35 @@ fn bounds_and_sum(positions: &[[f64; 3]]) -> (Aabb, f64) {
         bounds.grow(other.max);
         return (bounds, sum + more);
     }
-    let (mut low, mut high, mut sum) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], 0.0);
-    for p in positions {
-        for k in 0..3 {
-            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
-            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+    dispatch!(Level::new(), simd => simd.vectorize(
+        #[inline(always)]
+        || bounds_of_few(positions),
+    ))
+}
+
+#[inline(always)]
+fn bounds_of_few(positions: &[[f64; 3]]) -> (Aabb, f64) {
+    // The coordinates of eight points, which fill whole registers.
+    const ROW: usize = 24;
+    let (mut low, mut high, mut sums) = ([f64::INFINITY; ROW], [f64::NEG_INFINITY; ROW], [0.0; ROW]);
+    let (rows, rest) = positions.as_flattened().as_chunks::<ROW>();
+    let mut take = |i: usize, x: f64| {
+        low[i] = if x < low[i] { x } else { low[i] };
+        high[i] = if x > high[i] { x } else { high[i] };
+        sums[i] += 0.0 * x;
+    };
+    for row in rows {
+        for i in 0..ROW {
+            take(i, row[i]);
         }
-        sum += 0.0 * (p[0] + p[1] + p[2]);
     }
-    (Aabb { min: low, max: high }, sum)
+    for (i, x) in rest.iter().enumerate() {
+        take(i, *x);
+    }
+    let mut bounds = Aabb::EMPTY;
+    for i in 0..ROW {
+        bounds.min[i % 3] = bounds.min[i % 3].min(low[i]);
+        bounds.max[i % 3] = bounds.max[i % 3].max(high[i]);
+    }
+    (bounds, sums.iter().sum())
 }

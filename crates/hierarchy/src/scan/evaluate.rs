@@ -148,6 +148,7 @@ impl PointHierarchy {
             lists: &self.arrays.lists,
             listed: &self.arrays.listed,
             plan: &self.plan,
+            supports: None,
         }
     }
 }

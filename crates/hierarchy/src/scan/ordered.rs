@@ -190,7 +190,7 @@ impl Ordered {
         let groups = rough_groups(&blocks, work)?;
         let bare = Bare::new(work, topology, &boxes)?;
         let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
-        let mut fits = fits(&index, &positions, (&radii, &spacings), aim == Aim::Follow, work)?;
+        let mut fits = fits(&index, &positions, &spacings, aim == Aim::Follow, work)?;
         drop((bare, groups, spacings));
         work.progress().reach(share::FITS);
         let neighbours = BlockBoxes::new_in(work, &blocks, positions.len())?;

@@ -103,11 +103,7 @@ pub(crate) fn replace_organised(
     meta.dropped = Dropped { not_finite: points.len() - count, duplicate: 0, filtered: 0 };
     meta.is_oriented = false;
     pixels.fill(scan);
-    closing.reserve(scan);
-    closing.support(scan);
-    closing.turn(scan);
-    closing.bound(scan);
-    closing.finish(scan);
+    closing.close(scan);
     Ok(true)
 }
 

@@ -4,7 +4,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::{Aabb, Frame};
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{change_each, change_runs, fill};
+use nearmiss_lanes::parallel::{Runs, change_together, chunks, fill, runs};
 use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::blocks_of;
 
@@ -12,6 +12,8 @@ use crate::patch::classes::votes;
 use crate::patch::surfels::{Fit, align, fits_of, gaps_of};
 use crate::point::affine::{Motion, Rest};
 use crate::point::disc::PointCode;
+use crate::point::gather::Index;
+use crate::point::neighbours::supports;
 use crate::point::spacing::{Look, spacings_of};
 use crate::scan::build::PointHierarchy;
 use crate::scan::closing::Closing;
@@ -31,8 +33,8 @@ pub(crate) const LEAST_RADIUS: f32 = 1e-18;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// The number of leaves that a thread takes at once.
-const LEAVES_AT_ONCE: usize = 64;
+/// The number of runs of sixteen leaves that a thread takes at once.
+const AT_ONCE: usize = 4;
 
 /// How the points of a scan followed a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -105,22 +107,28 @@ impl Memory {
         !self.motions[leaf].is_carried
     }
 
-    /// Takes a leaf as it is in `scan` for its state at rest.
-    fn rest(&mut self, scan: &PointHierarchy, leaf: usize) {
-        let points = scan.topology().points_of_leaf(leaf);
+    /// Takes the `changed` leaves as they are in `scan` for their state at rest.
+    fn rest(&mut self, scan: &PointHierarchy, changed: &[u32]) {
         let Self { positions, normals, radii, leaves, .. } = self;
-        positions[points.clone()].copy_from_slice(&scan.positions()[points.clone()]);
-        normals[points.clone()].copy_from_slice(&scan.normals()[points.clone()]);
-        radii[points.clone()].copy_from_slice(&scan.radii()[points.clone()]);
-        leaves[leaf] = Rest::new(&positions[points.clone()], &normals[points]);
+        let rests = chunks(changed, |changed| {
+            let points = changed.iter().map(|leaf| scan.topology().points_of_leaf(*leaf as usize));
+            let rests = points.map(|points| Rest::new(&scan.positions()[points.clone()], &scan.normals()[points]));
+            rests.collect::<Vec<_>>()
+        });
+        for (leaf, rest) in changed.iter().zip(rests.into_iter().flatten()) {
+            let points = scan.topology().points_of_leaf(*leaf as usize);
+            positions[points.clone()].copy_from_slice(&scan.positions()[points.clone()]);
+            normals[points.clone()].copy_from_slice(&scan.normals()[points.clone()]);
+            radii[points.clone()].copy_from_slice(&scan.radii()[points]);
+            leaves[*leaf as usize] = rest;
+        }
     }
 }
 
 /// Moves the points of `scan`.
 pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>) -> Refitted {
     memory.settle(scan);
-    place(scan, placed);
-    carry(scan, memory);
+    carry(scan, memory, placed);
     let mut changed = std::mem::take(&mut memory.changed);
     changed.clear();
     changed.extend((0..scan.topology.leaves()).filter(|leaf| memory.is_changed(*leaf)).map(id32));
@@ -133,21 +141,14 @@ pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &Nex
 fn close(scan: &mut PointHierarchy, memory: &mut Memory, changed: &[u32]) -> usize {
     if changed.is_empty() {
         memory.closing.support(scan);
-        memory.closing.turn(scan);
-        memory.closing.bound(scan);
     } else {
         let blocks = blocks_of_leaves(&scan.topology, changed);
         let boxes = BlockBoxes::new(&scan.arrays.blocks, scan.len());
         let looks = space(scan, memory, &boxes, &blocks);
         memory.closing.support(scan);
-        memory.closing.turn(scan);
-        memory.closing.bound(scan);
-        // The boxes so far contain the points, which suffices to find neighbours.
         fit(scan, memory, (&boxes, &blocks), changed, &looks);
-        let Memory { closing, motions, .. } = memory;
-        closing.bound_above(scan, |leaf| !motions[leaf].is_carried);
     }
-    memory.closing.finish(scan);
+    memory.closing.bound(scan);
     changed.iter().map(|leaf| scan.topology.points_of_leaf(*leaf as usize).len()).sum()
 }
 
@@ -161,59 +162,76 @@ fn blocks_of_leaves(topology: &Topology, leaves: &[u32]) -> Vec<u32> {
     blocks
 }
 
-/// Sets the positions and the frame.
-pub(crate) fn place(scan: &mut PointHierarchy, placed: &NextFrame<'_>) {
+/// Sets the positions and the frame, and carries normals and radii along with their leaves.
+fn carry(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>) {
     // Unpacks the positions of a scan from a file.
     let _unpacked = scan.positions();
-    let (source, NextFrame { points, frame, .. }): (&[u32], _) = (&scan.arrays.source, placed);
-    let Some(positions) = scan.positions.get_mut() else { return };
-    fill(positions.to_mut(), |i| frame.to_local(points[source[i] as usize]));
-    let positions: &[[f32; 3]] = positions;
-    change_each(scan.arrays.blocks.to_mut(), WIDTH, |number, block| {
-        for (lane, p) in positions[number * WIDTH..].iter().take(WIDTH).enumerate() {
-            for k in 0..3 {
-                block.position[k][lane] = p[k];
-            }
-        }
-    });
     let meta = &mut scan.meta;
     (meta.frame, meta.bounds, meta.step) = (placed.frame, placed.bounds, placed.step);
-}
-
-/// Carries normals and radii along with their leaves.
-fn carry(scan: &mut PointHierarchy, memory: &mut Memory) {
-    let (topology, reach) = (scan.topology, scan.meta.reach);
+    let (topology, leaf_size, arrays) = (scan.topology, scan.topology.leaf_size(), &mut scan.arrays);
     let Memory { positions, normals, radii, leaves, motions, .. } = memory;
-    let (positions, normals, radii): (&[_], &[_], &[_]) = (positions, normals, radii);
-    let (now, level) = (scan.positions(), Level::new());
-    change_each(motions, WIDTH, |leaf, motion| {
-        let points = topology.points_of_leaf(leaf);
-        let (before, now, radii) = (&positions[points.clone()], &now[points.clone()], &radii[points]);
-        *motion = dispatch!(level, simd => simd.vectorize(
+    let rest = AtRest { positions, normals, radii, leaves, source: &arrays.source, reach: meta.reach };
+    let Some(positions) = scan.positions.get_mut() else { return };
+    // The points of sixteen leaves fill whole blocks.
+    let points = WIDTH * leaf_size;
+    let moved = (
+        runs(positions.to_mut(), points),
+        runs(arrays.blocks.to_mut(), leaf_size),
+        runs(motions, WIDTH),
+        runs(arrays.normals.to_mut(), points),
+        runs(arrays.radii.to_mut(), points),
+    );
+    let level = Level::new();
+    change_together(0..topology.leaves().div_ceil(WIDTH), AT_ONCE, moved, &|items, moved| {
+        dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || leaves[leaf].motion(before, now, radii, (STRETCH, OFF)),
+            || rest.carry(simd, placed, (leaf_size, items.start * WIDTH), moved),
         ));
     });
-    let (motions, leaf_size): (&[Motion], _) = (motions, topology.leaf_size());
-    let at_once = LEAVES_AT_ONCE * leaf_size;
-    change_runs(scan.arrays.normals.to_mut(), at_once, |number, some| {
-        let leaves = some.chunks_mut(leaf_size).zip(normals[number * at_once..].chunks(leaf_size));
-        for ((now, before), motion) in leaves.zip(&motions[number * LEAVES_AT_ONCE..]) {
-            dispatch!(level, simd => simd.vectorize(
-                #[inline(always)]
-                || motion.turn(simd, before, now),
-            ));
+}
+
+/// Parts of the positions, blocks, motions, normals and radii that move.
+type Moved<'a> = (Runs<'a, [f32; 3]>, Runs<'a, PointBlock>, Runs<'a, Motion>, Runs<'a, [f32; 3]>, Runs<'a, f32>);
+
+/// The state at rest that motions start from.
+struct AtRest<'a> {
+    positions: &'a [[f32; 3]],
+    normals: &'a [[f32; 3]],
+    radii: &'a [f32],
+    leaves: &'a [Rest],
+    source: &'a [u32],
+    reach: f32,
+}
+
+impl AtRest<'_> {
+    /// Moves some leaves with `leaf_size` points each, from the leaf `first` on.
+    #[inline(always)]
+    fn carry<S: Simd>(
+        &self,
+        simd: S,
+        NextFrame { points, frame, .. }: &NextFrame<'_>,
+        (leaf_size, first): (usize, usize),
+        (positions, blocks, motions, normals, radii): Moved<'_>,
+    ) {
+        let start = first * leaf_size;
+        for (now, source) in positions.elements.iter_mut().zip(&self.source[start..]) {
+            *now = frame.to_local(points[*source as usize]);
         }
-    });
-    change_runs(scan.arrays.radii.to_mut(), at_once, |number, some| {
-        let leaves = some.chunks_mut(leaf_size).zip(radii[number * at_once..].chunks(leaf_size));
-        for ((now, before), motion) in leaves.zip(&motions[number * LEAVES_AT_ONCE..]) {
+        for (block, points) in blocks.elements.iter_mut().zip(positions.elements.chunks(WIDTH)) {
+            block.place(points);
+        }
+        for (leaf, motion) in motions.elements.iter_mut().enumerate() {
+            let own = leaf * leaf_size..positions.elements.len().min((leaf + 1) * leaf_size);
+            let before = start + own.start..start + own.end;
+            let (radii_before, now) = (&self.radii[before.clone()], &positions.elements[own.clone()]);
+            *motion = self.leaves[first + leaf].motion(&self.positions[before.clone()], now, radii_before, (STRETCH, OFF));
+            motion.turn(simd, &self.normals[before], &mut normals.elements[own.clone()]);
             let stretch = if motion.is_carried { motion.stretch } else { 1.0 };
-            for (now, before) in now.iter_mut().zip(before) {
-                *now = (before * stretch).min(reach);
+            for (now, before) in radii.elements[own].iter_mut().zip(radii_before) {
+                *now = (before * stretch).min(self.reach);
             }
         }
-    });
+    }
 }
 
 /// Measures the spacing of the points of the changed leaves, which have these `blocks`, anew. Returns a
@@ -253,7 +271,10 @@ fn fit(
     looks: &(impl Fn(usize) -> Look + Sync + Send),
 ) {
     let topology = scan.topology;
-    let new = fits_of(&scan.index(), scan.positions(), scan.radii(), looks, changed);
+    // The boxes of the nodes are those of the frame before.
+    let supports = supports(&scan.arrays.groups);
+    let index = Index { supports: Some(&supports), ..scan.index() };
+    let new = fits_of(&index, scan.positions(), looks, changed);
     let is_oriented = scan.meta.is_oriented;
     // The normals of an oriented scan keep their side.
     let sided = |fit: Fit, before: [f32; 3]| {
@@ -261,90 +282,44 @@ fn fit(
     };
     let points = || changed.iter().flat_map(|leaf| topology.points_of_leaf(*leaf as usize));
     let carried: Vec<[f32; 3]> = points().map(|i| scan.normals()[i]).collect();
-    for ((i, fit), before) in points().zip(new).zip(&carried) {
-        set(scan, i, sided(fit, *before));
-    }
+    let fits = points().zip(new).zip(&carried).map(|((i, fit), before)| (i, sided(fit, *before)));
+    set(scan, fits);
     let tree = boxes.over(&scan.arrays.blocks);
-    let known =
-        |scan: &PointHierarchy, i: usize| Fit::new(scan.arrays.normals[i], scan.arrays.codes[i].kind());
+    let (normals, codes) = (scan.normals(), &scan.arrays.codes);
     let corrected = votes(
         &tree,
         scan.positions(),
         scan.radii(),
-        |i| known(scan, i),
+        |i| Fit::new(normals[i], codes[i].kind()),
         (blocks.len(), |k| blocks[k] as usize),
     );
-    let is_open = |(i, _): &(u32, Fit)| memory.is_changed(*i as usize / topology.leaf_size());
+    let leaf_of = |i: u32| i as usize / topology.leaf_size();
+    let is_open = |(i, _): &(u32, Fit)| memory.is_changed(leaf_of(*i));
     let corrected: Vec<(u32, Fit)> = corrected.into_iter().filter(is_open).collect();
-    for (i, fit) in &corrected {
+    let fits = corrected.iter().map(|&(i, fit)| {
         // All leaves before the last one are full.
-        let (leaf, place) = (*i as usize / topology.leaf_size(), *i as usize % topology.leaf_size());
-        let before =
-            changed.partition_point(|changed| (*changed as usize) < leaf) * topology.leaf_size() + place;
-        set(scan, *i as usize, sided(*fit, carried[before]));
-    }
+        let place = changed.partition_point(|changed| (*changed as usize) < leaf_of(i)) * topology.leaf_size();
+        (i as usize, sided(fit, carried[place + i as usize % topology.leaf_size()]))
+    });
+    set(scan, fits);
     let again: Vec<u32> = corrected.iter().map(|(i, _)| *i).collect();
-    let gaps = gaps_of(&scan.index(), scan.positions(), |i| scan.normals()[i], &again);
+    let index = Index { supports: Some(&supports), ..scan.index() };
+    let gaps = gaps_of(&index, scan.positions(), |i| scan.normals()[i], &again);
     let codes = scan.arrays.codes.to_mut();
     for ((i, fit), gap) in corrected.iter().zip(gaps) {
         codes[*i as usize] = PointCode::new(fit.kind(), gap);
     }
-    for leaf in changed {
-        if !is_oriented {
-            align(&mut scan.arrays.normals.to_mut()[topology.points_of_leaf(*leaf as usize)]);
-        }
-        memory.rest(scan, *leaf as usize);
+    if !is_oriented {
+        let normals = scan.arrays.normals.to_mut();
+        changed.iter().for_each(|leaf| align(&mut normals[topology.points_of_leaf(*leaf as usize)]));
     }
+    memory.rest(scan, changed);
 }
 
-/// Sets normal, class and gap of a point. An unknown gap is set to 0.
-fn set(scan: &mut PointHierarchy, i: usize, fit: Fit) {
-    scan.arrays.normals.to_mut()[i] = fit.normal;
-    scan.arrays.codes.to_mut()[i] = fit.point_code().0;
-}
-
-#[cfg(test)]
-mod tests {
-    use nearmiss_geometry::PointCloud;
-
-    use super::*;
-    use crate::scan::options::BuildOptions;
-
-    /// Moves a sheet of points. One corner of it folds, so its leaves are fitted anew.
-    fn folded(leaf_size: u32) -> (PointHierarchy, Memory, Refitted) {
-        let sheet = |fold: f64| -> Vec<[f64; 3]> {
-            let lattice = (0..3_600_u32).map(|i| [f64::from(i % 60), f64::from(i / 60)]);
-            lattice.map(|[x, y]| [x, y, 0.002 * x * x + fold * (x + y - 90.0).max(0.0)]).collect()
-        };
-        let cloud = PointCloud::from_positions(&sheet(0.0)).unwrap();
-        let mut scan =
-            PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(leaf_size)).unwrap();
-        let (mut memory, points) = (Memory::at_rest(), sheet(1.0));
-        let bounds = Aabb::of(points.iter().copied());
-        let placed = NextFrame { points: &points, frame: *scan.frame(), bounds, step: scan.meta.step };
-        let refitted = refit(&mut scan, &mut memory, &placed);
-        (scan, memory, refitted)
-    }
-
-    #[test]
-    fn bounds_above_changed_leaves_are_those_of_all_nodes_computed_anew() {
-        let bounds = |scan: &PointHierarchy| {
-            let arrays = &scan.arrays;
-            let bytes: [&[u8]; 4] = [
-                bytemuck::cast_slice(&arrays.siblings),
-                bytemuck::cast_slice(&arrays.reaches),
-                bytemuck::cast_slice(&arrays.surface_growths),
-                bytemuck::cast_slice(&arrays.obstacle_growths),
-            ];
-            bytes.map(<[u8]>::to_vec)
-        };
-        // Blocks straddle leaves of other sizes than 16.
-        for leaf_size in [10, 16, 24] {
-            let (mut scan, mut memory, refitted) = folded(leaf_size);
-            assert!(refitted.fitted > 100 && refitted.carried > 2_000, "{refitted:?}");
-            let partial = bounds(&scan);
-            memory.closing.bound(&mut scan);
-            assert!(partial == bounds(&scan), "leaves of {leaf_size}");
-        }
+/// Sets normals, classes and gaps of points. Unknown gaps are set to 0.
+fn set(scan: &mut PointHierarchy, fits: impl Iterator<Item = (usize, Fit)>) {
+    let (normals, codes) = (scan.arrays.normals.to_mut(), scan.arrays.codes.to_mut());
+    for (i, fit) in fits {
+        (normals[i], codes[i]) = (fit.normal, fit.point_code().0);
     }
 }

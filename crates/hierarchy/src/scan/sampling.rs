@@ -2,7 +2,7 @@
 
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{change_each, fill};
+use nearmiss_lanes::parallel::{both, change_each, fill};
 use nearmiss_store::{Room, Workspace};
 use nearmiss_surface::SurfacePlan;
 
@@ -96,21 +96,27 @@ fn extent(positions: &[[f32; 3]]) -> f32 {
 pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<u32>) -> f32 {
     const HALF: u32 = 16;
     let mut rank = id32(sampling_rank(radii.len()));
-    let mut half_at_rank = |halves: &mut dyn Iterator<Item = u32>| {
+    let (left, right) = radii.split_at(radii.len() / 2);
+    let mut half_at_rank = |half_of: &(dyn Fn(u32) -> Option<u32> + Sync)| {
         counts.clear();
-        counts.resize(1 << HALF, 0);
-        halves.for_each(|half| counts[half as usize] += 1);
-        let half = counts.iter().position(|&count| {
+        counts.resize(2 << HALF, 0);
+        let (counts, more) = counts.split_at_mut(1 << HALF);
+        let count = |radii: &[f32], counts: &mut [u32]| {
+            for half in radii.iter().filter_map(|radius| half_of(radius.to_bits())) {
+                counts[half as usize] += 1;
+            }
+        };
+        both(|| count(left, counts), || count(right, more));
+        let half = counts.iter().zip(more).position(|(count, more)| {
+            let count = *count + *more;
             let is_here = rank < count;
             rank -= if is_here { 0 } else { count };
             is_here
         });
         id32(half.unwrap_or_default())
     };
-    let bits = || radii.iter().map(|radius| radius.to_bits());
-    let upper = half_at_rank(&mut bits().map(|bits| bits >> HALF));
-    let lower =
-        half_at_rank(&mut bits().filter(|bits| bits >> HALF == upper).map(|bits| bits & ((1 << HALF) - 1)));
+    let upper = half_at_rank(&|bits| Some(bits >> HALF));
+    let lower = half_at_rank(&|bits| (bits >> HALF == upper).then_some(bits & ((1 << HALF) - 1)));
     f32::from_bits(upper << HALF | lower)
 }
 

@@ -1,6 +1,7 @@
 //! Validation of the leaf blocks: one that does not match its points gives false contacts.
 
 use bytemuck::bytes_of;
+use fearless_simd::{Level, dispatch};
 use nearmiss_lanes::parallel::ranges;
 
 use crate::scan::build::PointHierarchy;
@@ -8,14 +9,15 @@ use nearmiss_store::Flaw;
 
 /// Checks that the blocks and marks of all leaves match their points.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
-    let (topology, parts) = (scan.topology(), scan.leaf_parts());
+    let (topology, parts, level) = (scan.topology(), scan.leaf_parts(), Level::new());
     let blocks_a_leaf = scan.arrays.leaf_blocks.len() / topology.leaves();
     let (stored, marks) = (&*scan.arrays.leaf_blocks, &*scan.arrays.marks);
     let wrong = ranges(topology.leaves(), |mut leaves| {
         leaves.find(|&leaf| {
             let bounds = scan.tree().bounds(topology.leaf(leaf));
             let is_other = |number: usize| {
-                bytes_of(&stored[number]) != bytes_of(&parts.block(topology, number, &bounds))
+                let block = dispatch!(level, simd => parts.block(simd, topology, number, &bounds));
+                bytes_of(&stored[number]) != bytes_of(&block)
             };
             let mut blocks = leaf * blocks_a_leaf..(leaf + 1) * blocks_a_leaf;
             blocks.any(is_other) || marks[leaf] != parts.marks(topology, leaf, &bounds)
