@@ -41,6 +41,9 @@ pub(crate) const ROUNDING: f32 = 3e-6;
 pub const SLACK: f32 = 4e-6;
 
 impl OrientedBox {
+    /// An empty box without axes, as by default.
+    pub(crate) const NONE: Self = Self { centre: [0.0; 3], half: [0.0; 3], axes: [[0.0; 3]; 3], reach: 0.0 };
+
     /// The least and the greatest corner of a box along the coordinate axes about this one, a little larger.
     pub(crate) fn upright(&self) -> [[f64; 3]; 2] {
         let half = [0, 1, 2]

@@ -35,6 +35,9 @@ fn length(half: u16) -> f32 {
 }
 
 impl Growth {
+    /// No growth.
+    pub(crate) const NONE: Self = Self { low: [0; 3], high: [0; 3] };
+
     /// Returns the growth of `bounds` that makes it contain these intervals along its axes.
     pub(crate) fn new(bounds: &OrientedBox, low: [f32; 3], high: [f32; 3]) -> Self {
         Self::beyond(&bounds.along(&bounds.axes), low, high)

@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_index::{BlockTree, Nearest, PointBlock};
-use nearmiss_lanes::parallel::{chunks, collect_into, in_order};
+use nearmiss_lanes::parallel::{change_both, chunks, collect_into, in_order};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::symmetric_eigen;
 
@@ -412,7 +412,7 @@ pub(crate) fn smooth(
 ///
 /// Minima can be taken in any order, so this equals a limit before smoothing.
 pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
-    for (spacing, radius) in spacings.iter_mut().zip(radii) {
+    change_both(spacings, radii, 1 << 10, |_, spacing, radius| {
         if spacing.radius > reach {
             if spacing.look() == Look::Ring {
                 spacing.look = Look::Line as u32;
@@ -422,7 +422,7 @@ pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
             }
         }
         *radius = radius.min(reach);
-    }
+    });
 }
 
 /// Computes a value for each node, in the order of ids: for leaves from their points, for other

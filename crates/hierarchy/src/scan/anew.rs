@@ -7,61 +7,68 @@ use bytemuck::{Pod, Zeroable};
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{fill_runs, map_all};
-use nearmiss_store::{Array, Workspace};
+use nearmiss_lanes::parallel::{fill_runs, map_all, ranges};
+use nearmiss_store::Array;
 
-use crate::patch::surfels::{align_leaves, gaps_of};
+use crate::patch::surfels::{Fit, align_leaves, gaps_of};
 use crate::point::disc::PointCode;
 use crate::point::gather::{Index, NeighbourList};
 use crate::point::leaf_block::LeafParts;
-use crate::point::neighbours::rough_groups;
+use crate::point::neighbours::supports;
 use crate::scan::build::PointHierarchy;
 use crate::scan::closing::Closing;
 use crate::scan::data::Arrays;
-use crate::scan::options::{BuildError, BuildOptions};
+use crate::scan::options::BuildOptions;
 use crate::scan::ordered::Ordered;
-use crate::scan::points::ScanPoints;
+use crate::scan::points::Placement;
 use crate::scan::prepare::about;
 use crate::tree::topology::Topology;
-use crate::tree::wide::{Bare, Root};
+use crate::tree::wide::Root;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Fits the surface at points that are in order, and bounds the nodes as a refit does.
+/// Makes a scan of points that are in order and fitted, and bounds the nodes as a refit does. The arrays
+/// `before` are memory to reuse.
 pub(crate) fn fitted_anew(
-    points: &ScanPoints<'_>,
+    placement: Placement,
     ordered: Ordered,
     options: &BuildOptions,
     closing: &mut Closing,
-) -> Result<PointHierarchy, BuildError> {
-    let work = Workspace::in_memory();
-    let Ordered { topology, boxes, positions, source, radii, fits, blocks, plan, summary } = ordered;
-    let groups = rough_groups(&blocks, &work)?;
-    let bare = Bare::new(&work, topology, &boxes)?;
-    let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
-    let mut codes = map_all(&fits, |fit| fit.point_code().0);
-    let unknown: Vec<u32> = (0..fits.len()).filter(|&i| !fits[i].point_code().1).map(id32).collect();
-    let gaps = gaps_of(&index, &positions, |i| fits[i].normal, &unknown);
-    for (&i, gap) in unknown.iter().zip(gaps) {
-        codes[i as usize] = PointCode::new(fits[i as usize].kind(), gap);
-    }
+    before: Arrays,
+) -> PointHierarchy {
+    let Ordered { topology, positions, source, radii, fits, blocks, plan, summary, .. } = ordered;
     let mut normals = map_all(&fits, |fit| fit.normal);
     align_leaves(&mut normals, topology.leaf_size());
     let arrays = Arrays {
         blocks: blocks.into(),
-        groups: groups.into(),
         normals: normals.into(),
         radii: radii.into(),
-        codes: codes.into(),
+        codes: map_all(&fits, |fit| fit.point_code().0).into(),
         source: source.into(),
-        ..Arrays::default()
+        ..before
     };
-    let meta = about(points, options, *plan.options(), summary, Root::default());
+    let meta = about(placement, options, *plan.options(), summary, Root::default());
     let positions = OnceLock::from(Array::from(positions));
     let mut scan = PointHierarchy { meta, plan, topology, arrays, positions };
     resize(&mut scan, topology);
-    closing.close(&mut scan);
-    Ok(scan)
+    closing.support(&mut scan);
+    find_gaps(&mut scan, &fits);
+    closing.bound(&mut scan);
+    scan
+}
+
+/// Finds the gaps of the points whose `fits` do not tell them.
+fn find_gaps(scan: &mut PointHierarchy, fits: &[Fit]) {
+    let is_unknown = |i: &usize| !fits[*i].point_code().1;
+    let unknown: Vec<u32> =
+        ranges(fits.len(), |range| range.filter(is_unknown).map(id32).collect::<Vec<_>>()).concat();
+    let supports = supports(&scan.arrays.groups);
+    let index = Index { supports: Some(&supports), ..scan.index() };
+    let gaps = gaps_of(&index, scan.positions(), |i| fits[i].normal, &unknown);
+    let codes = scan.arrays.codes.to_mut();
+    for (&i, gap) in unknown.iter().zip(gaps) {
+        codes[i as usize] = PointCode::new(fits[i as usize].kind(), gap);
+    }
 }
 
 /// Gives the arrays of a scan the sizes for a topology. Neighbour lists become empty, samples are

@@ -35,13 +35,6 @@ pub(crate) struct Closing {
 }
 
 impl Closing {
-    /// Takes as much memory as a scan needs.
-    pub(crate) fn reserve(&mut self, scan: &PointHierarchy) {
-        let nodes = scan.topology.len();
-        self.boxes.resize(nodes, OrientedBox::default());
-        self.growths.resize(nodes, Default::default());
-    }
-
     /// Sets the sampling radius, the support radii of the points, and the balls around blocks. There
     /// are no neighbour lists afterwards.
     pub(crate) fn support(&mut self, scan: &mut PointHierarchy) {
@@ -61,15 +54,11 @@ impl Closing {
         }
     }
 
-    /// Does all steps for points that have just been fitted.
-    pub(crate) fn close(&mut self, scan: &mut PointHierarchy) {
-        self.reserve(scan);
-        self.support(scan);
-        self.bound(scan);
-    }
-
     /// Bounds all nodes, and sets all that depends on boxes.
     pub(crate) fn bound(&mut self, scan: &mut PointHierarchy) {
+        let nodes = scan.topology.len();
+        self.boxes.resize(nodes, OrientedBox::default());
+        self.growths.resize(nodes, Default::default());
         let memory = (&mut self.spreads, &mut self.solved);
         principal_axes(scan.positions(), &scan.topology, &mut self.boxes, memory);
         self.bound_leaves(scan);

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 
 use nearmiss_geometry::{Aabb, Frame, PointCloud};
-use nearmiss_lanes::parallel::{in_pool, map_all, on_threads};
+use nearmiss_lanes::parallel::{fill, in_pool, map_all, on_threads};
 use nearmiss_store::Workspace;
 use nearmiss_surface::Metric;
 
@@ -13,7 +13,7 @@ use crate::scan::deform_error::{DeformError, bounds_of};
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::ordered::{Aim, Ordered};
 use crate::scan::organised::{Pixels, replace_organised};
-use crate::scan::points::{ScanPoints, step};
+use crate::scan::points::{Placement, ScanPoints, step};
 use crate::scan::refit::{Memory, NextFrame, Refitted, refit};
 
 /// The greatest coordinate in units of the stored frame: beyond it, squares of squares of lengths
@@ -146,28 +146,22 @@ impl DeformingScan {
     /// Does the same, and starts loops from the current thread.
     fn renew_here(&mut self, points: &[[f64; 3]]) -> Result<(), DeformError> {
         let (frame, bounds) = self.check(points)?;
-        let source = self.scan.source().to_vec();
-        let positions = map_all(&source, |&i| frame.to_local(points[i as usize]));
-        let in_order = ScanPoints {
-            positions: &positions,
-            source: &source,
-            frame,
-            bounds,
-            dropped: self.scan.dropped(),
-            step: step(&frame, &bounds),
-        };
-        let work = Workspace::in_memory();
-        let ordered = Ordered::kept(&in_order, self.scan.meta.dense as usize, &self.options, &work)?;
-        let mut scan = fitted_anew(&in_order, ordered, &self.options, &mut self.memory.closing)?;
-        if self.scan.is_oriented() {
-            refit(
-                &mut self.scan,
-                &mut self.memory,
-                &NextFrame { points, frame, bounds, step: in_order.step },
-            );
-            scan.turn_normals(self.scan.normals());
+        let source = self.scan.source();
+        let mut positions = vec![[0.0; 3]; source.len()];
+        fill(&mut positions, |i| frame.to_local(points[source[i] as usize]));
+        let (unit, dense) = (1.0 / frame.scale, self.scan.meta.dense as usize);
+        let ordered = Ordered::kept((positions.into(), source.to_vec().into()), dense, &self.options, unit)?;
+        let step = step(&frame, &bounds);
+        let sides = self.scan.is_oriented().then(|| {
+            refit(&mut self.scan, &mut self.memory, &NextFrame { points, frame, bounds, step });
+            self.scan.normals().to_vec()
+        });
+        let placement = Placement { frame, bounds, dropped: self.scan.dropped(), step };
+        let before = std::mem::take(&mut self.scan.arrays);
+        self.scan = fitted_anew(placement, ordered, &self.options, &mut self.memory.closing, before);
+        if let Some(sides) = sides {
+            self.scan.turn_normals(&sides);
         }
-        self.scan = scan;
         self.memory.refresh();
         Ok(())
     }
@@ -192,15 +186,17 @@ impl DeformingScan {
     pub fn replace(&mut self, points: &[[f64; 3]]) -> Result<(), DeformError> {
         let cloud = PointCloud::cleaned(points)?;
         let twins = if cloud.dropped().duplicate > 0 { twins(&cloud, points) } else { Vec::new() };
-        let (options, closing) = (self.options, &mut self.memory.closing);
+        let Self { scan, options, memory, .. } = self;
         options.check()?;
-        let scan = on_threads(options.threads, || {
-            let (points, work) = ((&cloud).into(), Workspace::in_memory());
-            let ordered = Ordered::new(&points, &options, Aim::Follow, &work)?;
-            fitted_anew(&points, ordered, &options, closing)
-        })
-        .or(Err(BuildError::Threads(options.threads)))??;
-        (self.scan, self.given, self.twins) = (scan, points.len(), twins);
+        let replaced = on_threads(options.threads, || {
+            let (points, work) = (ScanPoints::from(&cloud), Workspace::in_memory());
+            let ordered = Ordered::new(&points, options, Aim::Follow, &work)?;
+            let before = std::mem::take(&mut scan.arrays);
+            *scan = fitted_anew(points.placement(), ordered, options, &mut memory.closing, before);
+            Ok::<_, BuildError>(())
+        });
+        replaced.or(Err(BuildError::Threads(options.threads)))??;
+        (self.given, self.twins) = (points.len(), twins);
         self.settle();
         Ok(())
     }

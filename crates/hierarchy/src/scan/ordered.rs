@@ -13,15 +13,15 @@ use crate::bounds::boxes::OrientedBox;
 use crate::patch::classes::{dense_first, vote};
 use crate::patch::surfels::{Fit, fits};
 use crate::point::gather::Index;
-use crate::point::neighbours::{self, rough_groups};
+use crate::point::neighbours::{self, rough_groups, supports};
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::points::ScanPoints;
 use crate::scan::sampling::{Sampling, set_reaches};
 use crate::scan::share;
 use crate::tree::items::{Item, Parts};
-use crate::tree::split::{bound_in_order, split};
+use crate::tree::split::split;
 use crate::tree::topology::Topology;
-use crate::tree::wide::Bare;
+use crate::tree::wide::Tree;
 
 /// Points in order, with their classes.
 pub(crate) struct Ordered {
@@ -157,27 +157,22 @@ impl Ordered {
         Ok(ordered)
     }
 
-    /// Keeps the order of `points`, the first `dense` of which fill leaves of their own.
+    /// Keeps the order of some points, the first `dense` of which fill leaves of their own. `unit` is the
+    /// length of the caller's unit in their coordinates. There are no boxes.
     pub(crate) fn kept(
-        points: &ScanPoints<'_>,
+        (positions, source): (Room<[f32; 3]>, Room<u32>),
         dense: usize,
         options: &BuildOptions,
-        work: &Workspace,
+        unit: f64,
     ) -> Result<Self, BuildError> {
-        let count = points.positions.len();
-        let topology = Topology::new(id32(count), options.leaf_size);
-        let mut items = work.room(count)?;
-        fill(&mut items, |i| Item { position: points.positions[i], index: points.source[i] });
-        let mut boxes = work.room(topology.len())?;
-        bound_in_order(&items, &topology, &mut boxes);
-        let (mut positions, mut source) = (work.room(count)?, work.room(count)?);
-        positions.copy_from_slice(points.positions);
-        source.copy_from_slice(points.source);
-        let unit = 1.0 / points.frame.scale;
-        Self::classified(topology, boxes, (positions, source), (options, unit, dense, Aim::Follow), work)
+        let (topology, work) =
+            (Topology::new(id32(positions.len()), options.leaf_size), Workspace::in_memory());
+        let boxes = work.room(0)?;
+        Self::classified(topology, boxes, (positions, source), (options, unit, dense, Aim::Follow), &work)
     }
 
-    /// Computes radii and classes of points in the order of a tree with these boxes.
+    /// Computes radii and classes of points in the order of a tree, and sets the greatest radii in its
+    /// boxes.
     fn classified(
         topology: Topology,
         mut boxes: Room<OrientedBox>,
@@ -188,10 +183,10 @@ impl Ordered {
         let Sampling { spacings, radii, sampling_radius, reach, plan, blocks } =
             Sampling::of(&positions, (&topology, &mut boxes), options, unit, work)?;
         let groups = rough_groups(&blocks, work)?;
-        let bare = Bare::new(work, topology, &boxes)?;
-        let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
+        let (supports, tree) = (supports(&groups), Tree::without_boxes(&topology));
+        let index = Index { supports: Some(&supports), ..Index::without_lists(tree, (&blocks, &groups), &plan) };
         let mut fits = fits(&index, &positions, &spacings, aim == Aim::Follow, work)?;
-        drop((bare, groups, spacings));
+        drop((supports, groups, spacings));
         work.progress().reach(share::FITS);
         let neighbours = BlockBoxes::new_in(work, &blocks, positions.len())?;
         vote(&neighbours.over(&blocks), &positions, &radii, &mut fits);

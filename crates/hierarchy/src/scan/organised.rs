@@ -103,7 +103,8 @@ pub(crate) fn replace_organised(
     meta.dropped = Dropped { not_finite: points.len() - count, duplicate: 0, filtered: 0 };
     meta.is_oriented = false;
     pixels.fill(scan);
-    closing.close(scan);
+    closing.support(scan);
+    closing.bound(scan);
     Ok(true)
 }
 

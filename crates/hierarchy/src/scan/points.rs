@@ -14,7 +14,20 @@ pub struct ScanPoints<'a> {
     pub(crate) step: f64,
 }
 
+/// Where the points of a scan are, and how many were left out.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placement {
+    pub(crate) frame: Frame,
+    pub(crate) bounds: Aabb,
+    pub(crate) dropped: Dropped,
+    pub(crate) step: f64,
+}
+
 impl ScanPoints<'_> {
+    pub(crate) const fn placement(&self) -> Placement {
+        Placement { frame: self.frame, bounds: self.bounds, dropped: self.dropped, step: self.step }
+    }
+
     /// Returns the number of points.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a scan has at least eight points")]

@@ -20,7 +20,7 @@ use crate::scan::data::{Arrays, HierarchyMeta};
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::ordered::{Ordered, Summary};
 use crate::scan::outline::Outline;
-use crate::scan::points::ScanPoints;
+use crate::scan::points::{Placement, ScanPoints};
 use crate::scan::share;
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Bare, Root, growths_of_siblings, reaches, siblings};
@@ -109,7 +109,7 @@ pub(crate) fn finish(
         source: source.into(),
         ..bounds(&topology, &boxes, [&surface_growths, &obstacle_growths], work)?
     };
-    let meta = about(points, options, *plan.options(), summary, root);
+    let meta = about(points.placement(), options, *plan.options(), summary, root);
     Ok(Prepared { meta, plan, topology, arrays, positions })
 }
 
@@ -140,7 +140,7 @@ fn bounds(
 
 /// Returns the metadata of a scan, without its outline.
 pub(crate) fn about(
-    points: &ScanPoints<'_>,
+    placement: Placement,
     options: &BuildOptions,
     surface: SurfaceOptions,
     summary: Summary,
@@ -148,10 +148,10 @@ pub(crate) fn about(
 ) -> HierarchyMeta {
     let Summary { dense, sampling_radius, reach } = summary;
     HierarchyMeta {
-        frame: points.frame,
-        bounds: points.bounds,
-        dropped: points.dropped,
-        step: points.step,
+        frame: placement.frame,
+        bounds: placement.bounds,
+        dropped: placement.dropped,
+        step: placement.step,
         sampling_radius,
         reach,
         dense: id32(dense),

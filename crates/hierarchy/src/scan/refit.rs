@@ -94,7 +94,6 @@ impl Memory {
         self.radii.extend_from_slice(scan.radii());
         self.leaves.resize(topology.leaves(), Rest::default());
         self.motions.resize(topology.leaves(), Motion::default());
-        self.closing.reserve(scan);
         let Self { positions, normals, leaves, .. } = self;
         fill(leaves, |leaf| {
             let points = topology.points_of_leaf(leaf);

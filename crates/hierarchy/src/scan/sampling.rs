@@ -77,8 +77,11 @@ pub(crate) fn check_reach(reach: f32, extent: f32, unit: f64) -> Result<(), Buil
     if is_sound { Ok(()) } else { Err(BuildError::Reach(f64::from(reach) / unit)) }
 }
 
-/// Sets the greatest radius of the points in the boxes of all nodes.
+/// Sets the greatest radius of the points in the boxes of all nodes, if there are any.
 pub(crate) fn set_reaches(topology: &Topology, boxes: &mut [OrientedBox], radii: &[f32]) {
+    if boxes.is_empty() {
+        return;
+    }
     let reaches = fold_nodes(topology, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
     for (bounds, reach) in boxes.iter_mut().zip(reaches) {
         bounds.reach = reach;

@@ -103,8 +103,7 @@ mod tests {
     use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 
     use super::*;
-    use crate::tree::items::Item;
-    use crate::tree::split::bound_in_order;
+    use crate::tree::items::{Item, about};
 
     #[test]
     fn axes_from_moments_span_boxes_as_small_as_axes_from_points() {
@@ -116,8 +115,8 @@ mod tests {
                 (0..).zip(&points).map(|(index, p)| Item { position: *p, index }).collect();
             for leaf_size in [16, 10] {
                 let topology = Topology::new(id32(points.len()), leaf_size);
-                let mut boxes = vec![OrientedBox::default(); topology.len()];
-                bound_in_order(&items, &topology, &mut boxes);
+                let of_points = |id| about(Level::new(), &items[topology.points(id)]);
+                let boxes: Vec<OrientedBox> = topology.ids().map(of_points).collect();
                 let mut found = boxes.clone();
                 principal_axes(&points, &topology, &mut found, (&mut Vec::new(), &mut Vec::new()));
                 for (id, (expected, found)) in boxes.iter().zip(&found).enumerate() {

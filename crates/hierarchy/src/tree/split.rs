@@ -5,8 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use fearless_simd::Level;
 use nearmiss_geometry::NodeId;
-use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{both, change_each};
+use nearmiss_lanes::parallel::both;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::tree::cut::best_axis;
@@ -43,15 +42,6 @@ pub(crate) fn split_loose(
     are_loose: &(impl Fn(&[Item]) -> bool + Sync),
 ) {
     Place { items, dense, half: Half::ALL, parts: Parts::Points }.split_loose(topology, are_loose);
-}
-
-/// Sets `boxes` to the boxes around the points of all nodes, whose order stays. O(n log n).
-pub(crate) fn bound_in_order(items: &[Item], topology: &Topology, boxes: &mut [OrientedBox]) {
-    const AT_ONCE: usize = 16;
-    let level = Level::new();
-    change_each(boxes, AT_ONCE, |id, bounds| {
-        *bounds = about(level, &items[topology.points(NodeId(id32(id)))]);
-    });
 }
 
 /// The points of some leaves.

@@ -117,6 +117,12 @@ pub struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
+    /// Returns a tree whose boxes are not known: for searches that use none.
+    pub(crate) fn without_boxes(topology: &'a Topology) -> Self {
+        const NONE: &Root = &Root { bounds: OrientedBox::NONE, growths: [Growth::NONE; 2] };
+        Self { topology, root: NONE, siblings: &[], reaches: &[], growths: [&[]; 2] }
+    }
+
     /// Returns the topology of the tree: its nodes and the points under each.
     #[inline]
     #[must_use]

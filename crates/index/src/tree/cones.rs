@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_lanes::parallel::{fill, map_all};
 use nearmiss_lanes::wide::{WIDTH, bits, load, squared};
 
 use super::walk::Walker;
@@ -35,20 +36,20 @@ impl<'a> BlockTree<'a> {
     pub fn cones(
         &'a self,
         tips: &'a mut [[f32; WIDTH]],
-        height: impl Fn(usize) -> f32,
+        height: impl Fn(usize) -> f32 + Sync + Send,
         slope: f32,
     ) -> Cones<'a> {
         assert_eq!(tips.len(), self.blocks.len(), "expected tips for each block");
-        for (block, tips) in tips.iter_mut().enumerate() {
-            *tips = [f32::INFINITY; WIDTH];
+        fill(tips, |block| {
+            let mut tips = [f32::INFINITY; WIDTH];
             let points = block * WIDTH..block * WIDTH + self.count(block);
             tips.iter_mut().zip(points).for_each(|(tip, i)| *tip = height(i));
-        }
+            tips
+        });
         let mut least: Vec<Vec<[f32; WIDTH]>> = Vec::with_capacity(self.levels.len());
         for _ in self.levels {
             let below = least.last().map_or(&*tips, |least| least);
-            let tips: Vec<f32> =
-                below.iter().map(|row| row.iter().copied().fold(f32::INFINITY, f32::min)).collect();
+            let tips = map_all(below, |row| row.iter().copied().fold(f32::INFINITY, f32::min));
             least.push(rows(&tips));
         }
         Cones { tree: self, slope, tips, least }
