@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, mask32x16, u32x16};
-use nearmiss_lanes::wide::WIDTH;
+use nearmiss_lanes::wide::{WIDTH, spread_out};
 
 /// Sixteen consecutive points of a scan, stored by coordinate. Point `i` is in block `i` /
 /// [`Self::WIDTH`].
@@ -35,9 +35,6 @@ impl PointBlock {
     }
 
     /// Returns a block of at most [`Self::WIDTH`] points with support radius zero.
-    ///
-    /// # Panics
-    /// If there are more points.
     #[must_use]
     pub fn of(positions: &[[f32; 3]]) -> Self {
         let mut block = Self::EMPTY;
@@ -45,26 +42,10 @@ impl PointBlock {
         block
     }
 
-    /// Sets the positions of the first points.
-    ///
-    /// # Panics
-    /// If there are more than [`Self::WIDTH`].
+    /// Sets the positions of the first points; of all if there are more.
     #[inline(always)]
     pub fn place(&mut self, positions: &[[f32; 3]]) {
-        if let Ok(positions) = <&[[f32; 3]; WIDTH]>::try_from(positions) {
-            // A known length is faster.
-            for lane in 0..WIDTH {
-                for k in 0..3 {
-                    self.position[k][lane] = positions[lane][k];
-                }
-            }
-            return;
-        }
-        for (lane, p) in positions.iter().enumerate() {
-            for k in 0..3 {
-                self.position[k][lane] = p[k];
-            }
-        }
+        spread_out(positions, &mut self.position);
     }
 
     /// Returns the blocks of all points of a scan, with support radius zero.

@@ -21,6 +21,14 @@ pub fn load<S: Simd>(simd: S, [x, y, z]: &[[f32; WIDTH]; 3]) -> Vectors<S> {
     [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
 }
 
+/// Puts vectors side by side, from the first lane on. Other lanes stay, and so do surplus vectors.
+#[inline(always)]
+pub fn spread_out(vectors: &[[f32; 3]], [x, y, z]: &mut [[f32; WIDTH]; 3]) {
+    for (((x, y), z), v) in x.iter_mut().zip(y).zip(z).zip(vectors) {
+        (*x, *y, *z) = (v[0], v[1], v[2]);
+    }
+}
+
 /// Loads points relative to `p`.
 #[inline(always)]
 #[must_use]

@@ -44,12 +44,8 @@ struct PartLanes {
 }
 
 impl PartLanes {
-    const NONE: Self = Self {
-        discs: DiscLanes::NONE,
-        ball: [0.0; WIDTH],
-        cell: [0.0; WIDTH],
-        slab: [0.0; WIDTH],
-    };
+    const NONE: Self =
+        Self { discs: DiscLanes::NONE, ball: [0.0; WIDTH], cell: [0.0; WIDTH], slab: [0.0; WIDTH] };
 
     #[inline(always)]
     fn of(points: Range<usize>, parts: &LeafParts<'_>) -> Self {
@@ -106,11 +102,7 @@ fn leaves_under(topology: &Topology, bottom: usize) -> Range<usize> {
 /// points, with their greatest radius, and sets its growths to the enclosures of the surface and of the
 /// obstacle. The surface is within `beyond` of the points. Does the same for the nodes whose children
 /// are leaves, and sets blocks and marks of the leaves. O(n).
-pub(crate) fn bound_leaves(
-    parts: &LeafParts<'_>,
-    beyond: f32,
-    low: Low<'_>,
-) {
+pub(crate) fn bound_leaves(parts: &LeafParts<'_>, beyond: f32, low: Low<'_>) {
     let (topology, level, beyond) = (low.topology, Level::new(), beyond * GROWN);
     let bottoms = (topology.inner() - topology.first_bottom()).max(1);
     change_together(0..bottoms, AT_ONCE, low, &|items, low| {
@@ -123,13 +115,7 @@ pub(crate) fn bound_leaves(
 
 impl Low<'_> {
     #[inline(always)]
-    fn bound<S: Simd>(
-        self,
-        simd: S,
-        parts: &LeafParts<'_>,
-        beyond: f32,
-        items: Range<usize>,
-    ) {
+    fn bound<S: Simd>(self, simd: S, parts: &LeafParts<'_>, beyond: f32, items: Range<usize>) {
         let Self { topology, bottoms: (bottom_boxes, bottom_growths), leaves, .. } = self;
         let (boxes, growths, blocks, marks) = leaves;
         let mut lanes = [PartLanes::NONE; MOST_BLOCKS];
@@ -144,7 +130,8 @@ impl Low<'_> {
                 }
                 let at = leaf - first_leaf;
                 let bounds = &mut boxes.elements[at];
-                growths.elements[at] = extents(simd, &lanes[start..count], &bounds.axes).bound(bounds, beyond);
+                growths.elements[at] =
+                    extents(simd, &lanes[start..count], &bounds.axes).bound(bounds, beyond);
                 let blocks = &mut blocks.elements[at * blocks.each..(at + 1) * blocks.each];
                 for (k, block) in blocks.iter_mut().enumerate() {
                     *block = match lanes[start..count].get(k) {
@@ -165,10 +152,7 @@ impl Low<'_> {
 /// Replaces the box of each node above the bottoms by the smallest one along its axes about the boxes of
 /// the bottoms under it, which are small beside it, and sets its growths to their enclosures. `boxes` and
 /// `growths` are those of all nodes. O(n log n).
-pub(crate) fn bound_above(
-    topology: &Topology,
-    (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]]),
-) {
+pub(crate) fn bound_above(topology: &Topology, (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]])) {
     let (level, first) = (Level::new(), topology.first_bottom());
     let (above, boxes) = boxes.split_at_mut(first);
     let (growths_above, growths) = growths.split_at_mut(first);

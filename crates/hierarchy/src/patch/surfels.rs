@@ -464,9 +464,12 @@ pub(crate) fn align_leaves(normals: &mut [[f32; 3]], leaf_size: usize) {
     change_runs(normals, LEAVES_AT_ONCE * leaf_size, |_, some| {
         for leaves in some.chunks_mut(MatrixBlock::WIDTH * leaf_size) {
             let (mut sums, mut solved) = (MatrixBlock::default(), EigenBlock::default());
-            for (lane, leaf) in leaves.chunks(leaf_size).enumerate() {
-                sums.put(lane, products(leaf));
-            }
+            dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || for (lane, leaf) in leaves.chunks(leaf_size).enumerate() {
+                    sums.put(lane, products(leaf));
+                },
+            ));
             symmetric_eigen_batch(level, &[sums], std::slice::from_mut(&mut solved));
             for (lane, leaf) in leaves.chunks_mut(leaf_size).enumerate() {
                 flip(leaf, solved.get(lane).vectors[2]);
@@ -483,6 +486,7 @@ pub(crate) fn align(normals: &mut [[f32; 3]]) {
 }
 
 /// Returns the sums of the products of components, as xx xy xz yy yz zz.
+#[inline(always)]
 fn products(normals: &[[f32; 3]]) -> [f64; 6] {
     let mut sums = [0.0; 6];
     for n in normals {

@@ -4,7 +4,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::vector::{cross, dot, sub, tangents};
-use nearmiss_lanes::wide::{WIDTH, along, load, squared};
+use nearmiss_lanes::wide::{WIDTH, along, load, spread_out, squared};
 
 /// The ridge of the fit as a share of the second moments. It draws directions in which the points do
 /// not extend, such as the normal of a flat patch, towards the identity.
@@ -140,11 +140,7 @@ impl Motion {
         let [x, y, z] = &self.cofactors;
         for (before, normals) in before.chunks(WIDTH).zip(normals.chunks_mut(WIDTH)) {
             let mut rows = [[0.0; WIDTH]; 3];
-            for (lane, n) in before.iter().enumerate() {
-                for k in 0..3 {
-                    rows[k][lane] = n[k];
-                }
-            }
+            spread_out(before, &mut rows);
             let n = load(simd, &rows);
             let mut turned = n;
             for k in 0..3 {

@@ -105,8 +105,13 @@ impl Supports {
         let (mut lanes, mut counts) = ([[0; PointBlock::WIDTH]; Self::MOST_LEVELS], [0; Self::MOST_LEVELS]);
         let top = self.levels.len();
         let below = |level: usize, id: u32, lanes: &mut [u32; PointBlock::WIDTH]| {
-            let count =
-                self.levels[level][id as usize].supporting(simd, x, distance, id * id32(PointBlock::WIDTH), lanes);
+            let count = self.levels[level][id as usize].supporting(
+                simd,
+                x,
+                distance,
+                id * id32(PointBlock::WIDTH),
+                lanes,
+            );
             // The last one is taken first.
             lanes[..count].reverse();
             count

@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i16x16};
 use nearmiss_lanes::parallel::{change_each, fill};
+use nearmiss_lanes::wide::spread_out;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::point::disc::DiscRadii;
@@ -283,16 +284,16 @@ impl LeafParts<'_> {
     /// Returns up to sixteen points of a leaf, at least one.
     #[inline(always)]
     pub(crate) fn lanes(&self, points: Range<usize>) -> DiscLanes {
-        let positions = repeated(&self.positions[points.clone()]);
-        let normals = repeated(&self.normals[points.clone()]);
-        let (codes, radii) = (repeated(&self.discs.codes[points.clone()]), repeated(&self.discs.radii[points.clone()]));
-        let mut lanes = DiscLanes { radius: radii, count: points.len(), ..DiscLanes::NONE };
+        let DiscRadii { codes, radii, reach, sampling_radius } = self.discs;
+        let last = points.end - 1;
+        let (mut position, mut normal) =
+            (self.positions[last].map(|x| [x; WIDTH]), self.normals[last].map(|x| [x; WIDTH]));
+        spread_out(&self.positions[points.clone()], &mut position);
+        spread_out(&self.normals[points.clone()], &mut normal);
+        let (codes, radius) = (repeated(&codes[points.clone()]), repeated(&radii[points.clone()]));
+        let mut lanes = DiscLanes { position, normal, radius, disc: [0.0; WIDTH], count: points.len() };
         for lane in 0..WIDTH {
-            for k in 0..3 {
-                lanes.position[k][lane] = positions[lane][k];
-                lanes.normal[k][lane] = normals[lane][k];
-            }
-            lanes.disc[lane] = codes[lane].disc(radii[lane], self.discs.reach, self.discs.sampling_radius);
+            lanes.disc[lane] = codes[lane].disc(radius[lane], reach, sampling_radius);
         }
         lanes
     }

@@ -327,3 +327,55 @@ pub(crate) fn neighbours(
     entries.truncate(end);
     failed.map_or(Ok((lists, entries)), Err)
 }
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::{CloudKind, cloud, rng};
+    use rand::RngExt;
+
+    use super::*;
+    use crate::tree::topology::Topology;
+    use crate::tree::wide::Tree;
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    fn every_group_with_support_near_a_place_is_found_by_balls() {
+        let (rng, work) = (&mut rng(3), Workspace::in_memory());
+        // One group, one level, two levels and three.
+        for count in [20, 300, 5_000, 70_000] {
+            let mut positions: Vec<[f32; 3]> =
+                cloud(CloudKind::Random, count, 8).iter().map(|p| p.map(|x| x as f32)).collect();
+            positions.sort_by(|p, q| p[0].total_cmp(&q[0]));
+            let mut blocks: Vec<PointBlock> = PointBlock::without_support(&positions).collect();
+            for block in &mut blocks {
+                block.support_radius =
+                    block.position[0].map(|x| if x < 1e30 { 0.01 + 0.02 * x.abs() } else { 0.0 });
+            }
+            let groups = rough_groups(&blocks, &work).unwrap();
+            let supports = supports(&groups);
+            let topology = Topology::new(id32(positions.len()), 16);
+            let plan = SurfacePlan::new(&nearmiss_surface::SurfaceOptions::default(), 0.01, 1.0).unwrap();
+            let index = Index {
+                supports: Some(&supports),
+                ..Index::without_lists(Tree::without_boxes(&topology), (&blocks, &groups), &plan)
+            };
+            let (mut found, mut most) = (Vec::new(), 0);
+            for _ in 0..200 {
+                let p: [f32; 3] = positions[rng.random_range(0..positions.len())];
+                let (x, distance) = (p.map(|c| c + rng.random_range(-0.1..0.1)), rng.random_range(0.0..0.1));
+                index.collect(Level::new(), x, distance, &mut found);
+                assert!(
+                    found.is_sorted_by(|a, b| a < b) && found.iter().all(|id| (*id as usize) < groups.len())
+                );
+                for (i, p) in positions.iter().enumerate() {
+                    let (block, d) = (&blocks[i / PointBlock::WIDTH], sub(*p, x));
+                    let is_near = dot(d, d).sqrt() < block.support_radius[i % PointBlock::WIDTH] + distance;
+                    let group = id32(i / PointBlock::WIDTH.pow(2));
+                    assert!(!is_near || found.contains(&group), "point {i} of {count} supports {x:?}");
+                }
+                most = most.max(found.len());
+            }
+            assert!(count < 5_000 || most < groups.len() / 2, "{most} of {} groups", groups.len());
+        }
+    }
+}

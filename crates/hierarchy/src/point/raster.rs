@@ -338,7 +338,9 @@ fn inner(all: &mut [f32], stride: usize) -> &mut [f32] {
 
 /// Returns `true` if there is a point: finite, and not zero, as some cameras mark holes.
 pub(crate) fn is_measured(p: [f64; 3]) -> bool {
-    p.iter().all(|x| x.is_finite()) && p != [0.0; 3]
+    // Zero for finite coordinates, NaN for others.
+    let zero = 0.0 * p[0] + 0.0 * p[1] + 0.0 * p[2];
+    (zero == 0.0) & ((p[0] != 0.0) | (p[1] != 0.0) | (p[2] != 0.0))
 }
 
 /// Returns the pixels of an image along a Hilbert curve (Hilbert 1891): sixteen in a row are a square

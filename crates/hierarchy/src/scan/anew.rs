@@ -98,8 +98,16 @@ pub(crate) fn resize(scan: &mut PointHierarchy, topology: Topology) {
     sized(&mut arrays.sample_lists, topology.inner() * samples);
     fill_runs(arrays.sample_lists.to_mut(), samples, |node, list| {
         let points = topology.points(NodeId(id32(node)));
-        for (k, sample) in list.iter_mut().enumerate() {
-            *sample = id32(points.start + (k * points.len().max(samples) / samples).min(points.len() - 1));
+        // k · all / samples for each k, without a division for each.
+        let all = points.len().max(samples);
+        let (step, share) = (all / samples, all % samples);
+        let (mut place, mut rest) = (0, 0);
+        for sample in list {
+            *sample = id32(points.start + place.min(points.len() - 1));
+            (place, rest) = (place + step, rest + share);
+            if rest >= samples {
+                (place, rest) = (place + 1, rest - samples);
+            }
         }
     });
     if let Some(positions) = scan.positions.get_mut() {

@@ -184,7 +184,8 @@ impl Ordered {
             Sampling::of(&positions, (&topology, &mut boxes), options, unit, work)?;
         let groups = rough_groups(&blocks, work)?;
         let (supports, tree) = (supports(&groups), Tree::without_boxes(&topology));
-        let index = Index { supports: Some(&supports), ..Index::without_lists(tree, (&blocks, &groups), &plan) };
+        let index =
+            Index { supports: Some(&supports), ..Index::without_lists(tree, (&blocks, &groups), &plan) };
         let mut fits = fits(&index, &positions, &spacings, aim == Aim::Follow, work)?;
         drop((supports, groups, spacings));
         work.progress().reach(share::FITS);

@@ -205,12 +205,18 @@ fn measured(points: &[[f64; 3]]) -> Measured {
         }
         return Measured { bounds: a.bounds, count: a.count + b.count };
     }
-    let mut all = Measured { bounds: Aabb::EMPTY, count: 0 };
-    for p in points.iter().filter(|p| is_measured(**p)) {
-        all.bounds.grow(*p);
-        all.count += 1;
+    let (mut bounds, mut count) = (Aabb::EMPTY, 0);
+    for p in points {
+        // No branch: holes come anywhere.
+        let is_there = is_measured(*p);
+        count += usize::from(is_there);
+        for k in 0..3 {
+            let [low, high] = if is_there { [p[k]; 2] } else { [f64::INFINITY, f64::NEG_INFINITY] };
+            bounds.min[k] = if low < bounds.min[k] { low } else { bounds.min[k] };
+            bounds.max[k] = if high > bounds.max[k] { high } else { bounds.max[k] };
+        }
     }
-    all
+    Measured { bounds, count }
 }
 
 /// Returns `false` for coordinates that a cloud refuses.

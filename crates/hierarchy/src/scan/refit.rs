@@ -111,7 +111,8 @@ impl Memory {
         let Self { positions, normals, radii, leaves, .. } = self;
         let rests = chunks(changed, |changed| {
             let points = changed.iter().map(|leaf| scan.topology().points_of_leaf(*leaf as usize));
-            let rests = points.map(|points| Rest::new(&scan.positions()[points.clone()], &scan.normals()[points]));
+            let rests =
+                points.map(|points| Rest::new(&scan.positions()[points.clone()], &scan.normals()[points]));
             rests.collect::<Vec<_>>()
         });
         for (leaf, rest) in changed.iter().zip(rests.into_iter().flatten()) {
@@ -190,7 +191,8 @@ fn carry(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>)
 }
 
 /// Parts of the positions, blocks, motions, normals and radii that move.
-type Moved<'a> = (Runs<'a, [f32; 3]>, Runs<'a, PointBlock>, Runs<'a, Motion>, Runs<'a, [f32; 3]>, Runs<'a, f32>);
+type Moved<'a> =
+    (Runs<'a, [f32; 3]>, Runs<'a, PointBlock>, Runs<'a, Motion>, Runs<'a, [f32; 3]>, Runs<'a, f32>);
 
 /// The state at rest that motions start from.
 struct AtRest<'a> {
@@ -223,7 +225,12 @@ impl AtRest<'_> {
             let own = leaf * leaf_size..positions.elements.len().min((leaf + 1) * leaf_size);
             let before = start + own.start..start + own.end;
             let (radii_before, now) = (&self.radii[before.clone()], &positions.elements[own.clone()]);
-            *motion = self.leaves[first + leaf].motion(&self.positions[before.clone()], now, radii_before, (STRETCH, OFF));
+            *motion = self.leaves[first + leaf].motion(
+                &self.positions[before.clone()],
+                now,
+                radii_before,
+                (STRETCH, OFF),
+            );
             motion.turn(simd, &self.normals[before], &mut normals.elements[own.clone()]);
             let stretch = if motion.is_carried { motion.stretch } else { 1.0 };
             for (now, before) in radii.elements[own].iter_mut().zip(radii_before) {
@@ -297,7 +304,8 @@ fn fit(
     let corrected: Vec<(u32, Fit)> = corrected.into_iter().filter(is_open).collect();
     let fits = corrected.iter().map(|&(i, fit)| {
         // All leaves before the last one are full.
-        let place = changed.partition_point(|changed| (*changed as usize) < leaf_of(i)) * topology.leaf_size();
+        let place =
+            changed.partition_point(|changed| (*changed as usize) < leaf_of(i)) * topology.leaf_size();
         (i as usize, sided(fit, carried[place + i as usize % topology.leaf_size()]))
     });
     set(scan, fits);

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::change_each;
@@ -22,11 +22,13 @@ pub(crate) struct Spread {
     second: [f64; 6],
 }
 
+#[inline(always)]
 fn products([x, y, z]: [f64; 3]) -> [f64; 6] {
     [x * x, x * y, x * z, y * y, y * z, z * z]
 }
 
 impl Spread {
+    #[inline(always)]
     fn of(points: &[[f32; 3]]) -> Self {
         let (origin, mut first, mut second) = (points[0], [0.0; 3], [0.0; 6]);
         for p in points {
@@ -75,7 +77,10 @@ pub(crate) fn principal_axes(
     spreads.resize(count, Spread::default());
     solved.resize(count.div_ceil(WIDTH), EigenBlock::default());
     change_each(&mut spreads[inner..], AT_ONCE, |leaf, spread| {
-        *spread = Spread::of(&positions[topology.points_of_leaf(leaf)]);
+        *spread = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || Spread::of(&positions[topology.points_of_leaf(leaf)]),
+        ));
     });
     // Children come after their parent.
     for id in (0..inner).rev() {
