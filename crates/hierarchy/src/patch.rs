@@ -1,5 +1,6 @@
 //! Data of the points of a node: tangent discs, samples, coverings, enclosures.
 
+pub(crate) mod alignment;
 pub(crate) mod centres;
 pub(crate) mod classes;
 pub(crate) mod covering;

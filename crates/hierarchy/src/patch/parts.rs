@@ -69,8 +69,8 @@ impl PartLanes {
     }
 }
 
-/// What is to be set of the *bottoms*, the nodes whose children are leaves, and of these leaves: their
-/// boxes, with axes that stay, and their growths. A tree of one leaf has one bottom, without arrays.
+/// The *bottoms*, nodes whose children are leaves, and these leaves: their boxes, whose axes are known, and
+/// the other arrays to set. A tree of one leaf has one bottom, without a box.
 #[derive(Debug)]
 pub(crate) struct Low<'a> {
     pub(crate) topology: &'a Topology,

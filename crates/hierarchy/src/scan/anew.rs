@@ -10,7 +10,8 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{fill_runs, map_all, ranges};
 use nearmiss_store::Array;
 
-use crate::patch::surfels::{Fit, align_leaves, gaps_of};
+use crate::patch::alignment::align_leaves;
+use crate::patch::surfels::{Fit, gaps_of};
 use crate::point::disc::PointCode;
 use crate::point::gather::{Index, NeighbourList};
 use crate::point::leaf_block::LeafParts;

@@ -7,8 +7,9 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{both, change_each, fill, ranges};
 use nearmiss_surface::SurfacePlan;
 
+use crate::patch::alignment::align_leaves;
 use crate::patch::pixels::{find_borders, fit, vote};
-use crate::patch::surfels::{Fit, align_leaves};
+use crate::patch::surfels::Fit;
 use crate::point::disc::PointCode;
 use crate::point::kind::PointKind;
 use crate::point::raster::{MOST_NEIGHBOURS, MOST_PIXELS, Pixel, Raster, is_measured, limited};

@@ -8,11 +8,12 @@ use nearmiss_surface::{Metric, SurfaceOptions, SurfacePlan};
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
+use crate::patch::alignment::align_leaves;
 use crate::patch::covering::{Ground, Solid, coverings};
 use crate::patch::enclosure::growths;
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::{lists as lists_of_samples, samples};
-use crate::patch::surfels::{Known, Surfels, align_leaves, surfels};
+use crate::patch::surfels::{Known, Surfels, surfels};
 use crate::point::disc::DiscRadii;
 use crate::point::gather::Index;
 use crate::point::neighbours::{groups, neighbours};

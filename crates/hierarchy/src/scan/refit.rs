@@ -8,8 +8,9 @@ use nearmiss_lanes::parallel::{Runs, change_together, chunks, fill, runs};
 use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::blocks_of;
 
+use crate::patch::alignment::align;
 use crate::patch::classes::votes;
-use crate::patch::surfels::{Fit, align, fits_of, gaps_of};
+use crate::patch::surfels::{Fit, fits_of, gaps_of};
 use crate::point::affine::{Motion, Rest};
 use crate::point::disc::PointCode;
 use crate::point::gather::Index;
