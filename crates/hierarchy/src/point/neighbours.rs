@@ -346,7 +346,7 @@ mod tests {
             let mut positions: Vec<[f32; 3]> =
                 cloud(CloudKind::Random, count, 8).iter().map(|p| p.map(|x| x as f32)).collect();
             // Along columns, so that points that follow each other are mostly close.
-            let column = |p: &[f32; 3]| [p[0], p[1]].map(|x| (8.0 * x) as i32);
+            let column = |p: &[f32; 3]| [p[0], p[1]].map(|x| (3.0 * x) as i32);
             positions.sort_by(|p, q| column(p).cmp(&column(q)).then(p[2].total_cmp(&q[2])));
             let mut blocks: Vec<PointBlock> = PointBlock::without_support(&positions).collect();
             for block in &mut blocks {
