@@ -2,7 +2,7 @@
 
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{both, change_each, fill};
+use nearmiss_lanes::parallel::{both, change_each, fill, ranges};
 use nearmiss_store::{Room, Workspace};
 use nearmiss_surface::SurfacePlan;
 
@@ -90,37 +90,57 @@ pub(crate) fn set_reaches(topology: &Topology, boxes: &mut [OrientedBox], radii:
 
 /// Returns the greatest absolute coordinate.
 fn extent(positions: &[[f32; 3]]) -> f32 {
-    positions.iter().flatten().fold(0.0, |most, x| most.max(x.abs()))
+    /// The coordinates of four points, which fill registers.
+    const ROW: usize = 12;
+    let greatest = ranges(positions.len(), |range| {
+        let (rows, rest) = positions[range].as_flattened().as_chunks::<ROW>();
+        let mut most = [0.0_f32; ROW];
+        let mut take = |i: usize, x: f32| most[i] = if x.abs() > most[i] { x.abs() } else { most[i] };
+        for row in rows {
+            for i in 0..ROW {
+                take(i, row[i]);
+            }
+        }
+        rest.iter().for_each(|x| take(0, *x));
+        most.into_iter().fold(0.0, f32::max)
+    });
+    greatest.into_iter().fold(0.0, f32::max)
 }
 
 /// Returns the [sampling radius](sampling_rank) of radii, none of which may be negative. Numbers
-/// that are not negative have the same order as their bits. So the upper halves of the bits are
-/// counted first, then the lower halves. `counts` is reused memory.
+/// that are not negative have the same order as their bits. So the highest digits of the bits are
+/// counted first, then lower ones. `counts` is reused memory.
 pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<u32>) -> f32 {
-    const HALF: u32 = 16;
+    /// The number of bits of a digit. With fewer, most numbers have the same one, and counts wait for each other.
+    const DIGIT: u32 = 16;
     let mut rank = id32(sampling_rank(radii.len()));
     let (left, right) = radii.split_at(radii.len() / 2);
-    let mut half_at_rank = |half_of: &(dyn Fn(u32) -> Option<u32> + Sync)| {
+    // The bits found so far, and the number of lower ones.
+    let (mut found, mut below) = (0_u32, u32::BITS);
+    while below > 0 {
+        let digit = below.min(DIGIT);
         counts.clear();
-        counts.resize(2 << HALF, 0);
-        let (counts, more) = counts.split_at_mut(1 << HALF);
+        counts.resize(2 << digit, 0);
+        let (counts, more) = counts.split_at_mut(1 << digit);
         let count = |radii: &[f32], counts: &mut [u32]| {
-            for half in radii.iter().filter_map(|radius| half_of(radius.to_bits())) {
-                counts[half as usize] += 1;
+            for bits in radii.iter().map(|radius| radius.to_bits()) {
+                // The first digit has nothing above it.
+                if u64::from(bits) >> below == u64::from(found) {
+                    counts[(bits >> (below - digit)) as usize % counts.len()] += 1;
+                }
             }
         };
         both(|| count(left, counts), || count(right, more));
-        let half = counts.iter().zip(more).position(|(count, more)| {
+        let here = counts.iter().zip(more).position(|(count, more)| {
             let count = *count + *more;
             let is_here = rank < count;
             rank -= if is_here { 0 } else { count };
             is_here
         });
-        id32(half.unwrap_or_default())
-    };
-    let upper = half_at_rank(&|bits| Some(bits >> HALF));
-    let lower = half_at_rank(&|bits| (bits >> HALF == upper).then_some(bits & ((1 << HALF) - 1)));
-    f32::from_bits(upper << HALF | lower)
+        found = found << digit | id32(here.unwrap_or_default());
+        below -= digit;
+    }
+    f32::from_bits(found)
 }
 
 /// Returns the index of the sampling radius among `count` ascending radii.
