@@ -111,7 +111,8 @@ fn extent(positions: &[[f32; 3]]) -> f32 {
 /// that are not negative have the same order as their bits. So the highest digits of the bits are
 /// counted first, then lower ones. `counts` is reused memory.
 pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<u32>) -> f32 {
-    /// The number of bits of a digit. With fewer, most numbers have the same one, and counts wait for each other.
+    /// The number of bits of a digit. With fewer, most numbers have the same one, and its count waits for
+    /// itself.
     const DIGIT: u32 = 16;
     let mut rank = id32(sampling_rank(radii.len()));
     let (left, right) = radii.split_at(radii.len() / 2);
