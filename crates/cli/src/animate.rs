@@ -133,7 +133,7 @@ fn is_kinetic(
         && match partner {
             Partner::Moving(others) => others.triangles.is_some(),
             Partner::Still(still) => matches!(still, Still::Mesh(_)),
-            Partner::Nothing => false,
+            Partner::Nothing => true,
         };
     if !are_meshes || args.rate < OFTEN || frames.len() < 2 {
         return Ok(false);
@@ -184,7 +184,7 @@ impl<'a> Told<'a> {
         }
     }
 
-    /// Moves two meshes through all query times by events.
+    /// Moves meshes through all query times by events.
     fn follow_events(
         &mut self,
         frames: &Frames,

@@ -25,5 +25,5 @@ mod separation;
 pub use counts::Counts;
 pub use error::KineticError;
 pub use plan::FlightPlan;
-pub use separation::{FirstContact, SeparationList};
+pub use separation::{FirstContact, SelfSeparationList, SeparationList};
 pub use tree::KineticTree;

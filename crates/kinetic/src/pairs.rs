@@ -36,6 +36,21 @@ impl View<'_> {
         self.trees[tree].nodes.link(nodes[tree]).is_leaf()
     }
 
+    /// Returns `true` if the pair with child `k` of a node of an own pair, that of `tree`, is an own pair
+    /// too; `None` if it is left out. Of two nodes beside each other, the first one comes first in a pair.
+    fn own_below(&self, tree: usize, nodes: [u32; 2], k: u32) -> Option<bool> {
+        if tree == 0 {
+            return Some(true);
+        }
+        let parent = |node: u32| self.trees[0].nodes.link(node).parent;
+        let mut above = nodes[0];
+        while parent(above) != nodes[1] {
+            above = parent(above);
+        }
+        let own = above - self.trees[1].nodes.link(nodes[1]).children;
+        if k == own { Some(true) } else { (k > own).then_some(false) }
+    }
+
     /// Returns the tree whose node a pair splits: the one with more primitives.
     fn splits(&self, nodes: [u32; 2]) -> Option<usize> {
         let size = |tree: usize| self.trees[tree].nodes.link(nodes[tree]).size;
@@ -54,6 +69,9 @@ const fn winner_side(tree: usize, side: Side) -> Side {
 }
 
 /// Two nodes, one of each tree.
+///
+/// A tree can also be compared with itself. Then the second node of an *own* pair is the first one or
+/// above it, so their boxes never part.
 #[derive(Debug, Clone, Copy)]
 struct NodePair {
     /// The nodes; [`NONE`] in an unused pair.
@@ -64,13 +82,21 @@ struct NodePair {
     side: Side,
     /// The boxes have a point in common.
     meets: bool,
+    is_own: bool,
     /// The pairs after and before this one with the same node, for each tree.
     next: [u32; 2],
     before: [u32; 2],
 }
 
-const UNUSED: NodePair =
-    NodePair { nodes: [NONE; 2], children: 0, side: 0, meets: false, next: [NONE; 2], before: [NONE; 2] };
+const UNUSED: NodePair = NodePair {
+    nodes: [NONE; 2],
+    children: 0,
+    side: 0,
+    meets: false,
+    is_own: false,
+    next: [NONE; 2],
+    before: [NONE; 2],
+};
 
 /// The pairs that a test of the trees from the roots visits now: those below pairs that meet.
 #[derive(Debug, Clone, Default)]
@@ -88,8 +114,8 @@ pub(crate) struct Pairs {
 }
 
 impl Pairs {
-    /// Starts again from the roots.
-    pub(crate) fn restart(&mut self, view: View<'_>) {
+    /// Starts again from the roots. `is_own` tells that both trees are the same one.
+    pub(crate) fn restart(&mut self, view: View<'_>, is_own: bool) {
         self.pairs.clear();
         self.pairs.resize(2, UNUSED);
         self.free.clear();
@@ -99,7 +125,7 @@ impl Pairs {
             heads.clear();
             heads.resize(tree.nodes.nodes.len(), NONE);
         }
-        self.enter(ROOTS, [ROOT; 2]);
+        self.enter(ROOTS, [ROOT; 2], is_own);
         self.settle(ROOTS, view);
     }
 
@@ -128,7 +154,7 @@ impl Pairs {
         let mut at = self.heads[tree][node as usize];
         while at != NONE {
             let pair = &self.pairs[at as usize];
-            if pair.meets || sides & 1 << winner_side(tree, pair.side) != 0 {
+            if !pair.is_own && (pair.meets || sides & 1 << winner_side(tree, pair.side) != 0) {
                 touched.push(at);
             }
             at = pair.next[tree];
@@ -144,9 +170,12 @@ impl Pairs {
 
     /// Compares the boxes of a pair.
     fn settle(&mut self, pair: u32, view: View<'_>) {
-        let nodes = self.pairs[pair as usize].nodes;
+        let NodePair { nodes, is_own, .. } = self.pairs[pair as usize];
         if view.is_empty(nodes) {
             return;
+        }
+        if is_own {
+            return self.meet(pair, view);
         }
         let sides = (0..SIDES).filter(|&side| is_apart(view, nodes, side));
         match last_to_meet(view, nodes, sides) {
@@ -165,8 +194,8 @@ impl Pairs {
 
     /// Notes that a pair meets, and compares those below it.
     fn meet(&mut self, pair: u32, view: View<'_>) {
-        let NodePair { nodes, meets, .. } = self.pairs[pair as usize];
-        let (side, time) = first_to_part(view, nodes);
+        let NodePair { nodes, meets, is_own, .. } = self.pairs[pair as usize];
+        let (side, time) = if is_own { (0, f64::INFINITY) } else { first_to_part(view, nodes) };
         let found = &mut self.pairs[pair as usize];
         (found.side, found.meets) = (side, true);
         self.queue.set(pair, time);
@@ -183,14 +212,17 @@ impl Pairs {
         for k in 0..2 {
             let mut below = nodes;
             below[tree] = first + k;
-            self.enter(children + k, below);
-            self.settle(children + k, view);
+            let within = if is_own { view.own_below(tree, nodes, k) } else { Some(false) };
+            if let Some(is_own) = within {
+                self.enter(children + k, below, is_own);
+                self.settle(children + k, view);
+            }
         }
     }
 
     /// Enters a pair into the lists of its nodes.
-    fn enter(&mut self, pair: u32, nodes: [u32; 2]) {
-        self.pairs[pair as usize] = NodePair { nodes, ..UNUSED };
+    fn enter(&mut self, pair: u32, nodes: [u32; 2], is_own: bool) {
+        self.pairs[pair as usize] = NodePair { nodes, is_own, ..UNUSED };
         for tree in 0..2 {
             let head = std::mem::replace(&mut self.heads[tree][nodes[tree] as usize], pair);
             self.pairs[pair as usize].next[tree] = head;
@@ -206,6 +238,9 @@ impl Pairs {
             return;
         }
         for child in [children, children + 1] {
+            if self.pairs[child as usize].nodes[0] == NONE {
+                continue;
+            }
             self.drop_below(child);
             self.queue.set(child, f64::INFINITY);
             let NodePair { nodes, next, before, .. } =

@@ -1,4 +1,5 @@
-//! `SeparationList`: continuous collision detection of two kinetic trees.
+//! `SeparationList` and `SelfSeparationList`: continuous collision detection of two kinetic trees, and of
+//! one with itself.
 
 use crate::error::KineticError;
 use crate::pairs::{Pairs, View};
@@ -58,13 +59,7 @@ impl SeparationList {
         b: &mut KineticTree,
         time: f64,
     ) -> Result<(), KineticError> {
-        let time = self.start(a, b, time)?;
-        while self.next_time(a, b) <= time {
-            self.step(a, b);
-        }
-        self.pairs.forget_fresh();
-        self.end(a, b, time);
-        Ok(())
+        self.advance_trees(&mut Trees::Two([a, b]), time)
     }
 
     /// Advances both trees and the list to the earliest time, up to `until`, at which two
@@ -86,53 +81,25 @@ impl SeparationList {
         until: f64,
         mut narrow: impl FnMut([&KineticTree; 2], [u32; 2], [f64; 2]) -> Option<f64>,
     ) -> Result<Option<FirstContact>, KineticError> {
-        let until = self.start(a, b, until)?;
-        let mut best: Option<FirstContact> = None;
-        let mut now = a.clock;
-        let mut found = std::mem::take(&mut self.found);
-        self.pairs.refresh_all();
-        loop {
-            let knot = |tree: &KineticTree| tree.points.knots.first().map_or(f64::INFINITY, |(time, _)| time);
-            let end = knot(a).min(knot(b));
-            let limit = best.map_or(until, |best| best.time);
-            self.pairs.take_fresh(&mut found);
-            for &leaves in &found {
-                best = narrowed([a, b], leaves, [now, limit.min(end)], best, &mut narrow);
-            }
-            let limit = best.map_or(until, |best| best.time);
-            let next = self.next_time(a, b);
-            if next > limit {
-                break;
-            }
-            self.step(a, b);
-            now = next.max(now);
-            if next >= end {
-                self.pairs.refresh_all();
-            }
-        }
-        self.found = found;
-        self.end(a, b, best.map_or(until, |best| best.time));
-        Ok(best)
+        self.next_contact_of(&mut Trees::Two([a, b]), until, &mut narrow)
     }
 
     /// Calls `visit` with each pair of primitives whose boxes now have a point in common, after a
     /// call of [`advance`](Self::advance) or [`next_contact`](Self::next_contact) with these trees.
-    pub fn for_each_overlap(&self, a: &KineticTree, b: &KineticTree, mut visit: impl FnMut(u32, u32)) {
+    pub fn for_each_overlap(&self, a: &KineticTree, b: &KineticTree, visit: impl FnMut(u32, u32)) {
+        self.overlaps([a, b], false, visit);
+    }
+
+    fn overlaps(&self, [a, b]: [&KineticTree; 2], is_own: bool, mut visit: impl FnMut(u32, u32)) {
         let bounds = |tree: &KineticTree, primitive| tree.primitive_bounds(primitive);
         self.pairs.for_each(|nodes, meets| {
             if !meets {
                 return;
             }
-            for &i in a.nodes.primitives_of(nodes[0]) {
-                let Some(own) = bounds(a, i) else { continue };
-                for &j in b.nodes.primitives_of(nodes[1]) {
-                    let other = bounds(b, j);
-                    let overlaps = other.is_some_and(|other| {
-                        (0..3).all(|k| own.min[k] <= other.max[k] && other.min[k] <= own.max[k])
-                    });
-                    if overlaps {
-                        visit(i, j);
-                    }
+            for (i, j) in primitives([a, b], nodes, is_own) {
+                let (Some(own), Some(other)) = (bounds(a, i), bounds(b, j)) else { continue };
+                if (0..3).all(|k| own.min[k] <= other.max[k] && other.min[k] <= own.max[k]) {
+                    visit(i, j);
                 }
             }
         });
@@ -146,53 +113,211 @@ impl SeparationList {
         counts
     }
 
+    fn advance_trees(&mut self, trees: &mut Trees<'_>, time: f64) -> Result<(), KineticError> {
+        let time = self.start(trees, time)?;
+        while self.next_time(trees) <= time {
+            self.step(trees);
+        }
+        self.pairs.forget_fresh();
+        self.end(trees, time);
+        Ok(())
+    }
+
+    fn next_contact_of(
+        &mut self,
+        trees: &mut Trees<'_>,
+        until: f64,
+        narrow: &mut impl FnMut([&KineticTree; 2], [u32; 2], [f64; 2]) -> Option<f64>,
+    ) -> Result<Option<FirstContact>, KineticError> {
+        let until = self.start(trees, until)?;
+        let mut best: Option<FirstContact> = None;
+        let mut now = trees.both()[0].clock;
+        let mut found = std::mem::take(&mut self.found);
+        self.pairs.refresh_all();
+        loop {
+            let knot = |tree: &KineticTree| tree.points.knots.first().map_or(f64::INFINITY, |(time, _)| time);
+            let end = trees.both().map(knot).into_iter().fold(f64::INFINITY, f64::min);
+            let limit = best.map_or(until, |best| best.time);
+            self.pairs.take_fresh(&mut found);
+            for &leaves in &found {
+                best = narrowed(trees, leaves, [now, limit.min(end)], best, narrow);
+            }
+            let limit = best.map_or(until, |best| best.time);
+            let next = self.next_time(trees);
+            if next > limit {
+                break;
+            }
+            self.step(trees);
+            now = next.max(now);
+            if next >= end {
+                self.pairs.refresh_all();
+            }
+        }
+        self.found = found;
+        self.end(trees, best.map_or(until, |best| best.time));
+        Ok(best)
+    }
+
     /// Checks the trees; starts the list again if they changed.
-    fn start(&mut self, a: &mut KineticTree, b: &mut KineticTree, time: f64) -> Result<f64, KineticError> {
+    fn start(&mut self, trees: &mut Trees<'_>, time: f64) -> Result<f64, KineticError> {
+        let [a, b] = trees.both();
         if a.clock != b.clock {
             return Err(KineticError::Clocks { a: a.clock, b: b.clock });
         }
         let time = a.coming(time)?;
         if self.known != Some(state_of([a, b])) {
-            self.pairs.restart(View { trees: [a, b], now: a.clock });
+            self.pairs.restart(View { trees: [a, b], now: a.clock }, trees.is_one());
         }
-        for tree in [a, b] {
-            tree.changes.get_or_insert_default().clear();
+        for k in 0..trees.count() {
+            trees.get(k).changes.get_or_insert_default().clear();
         }
         Ok(time)
     }
 
-    fn end(&mut self, a: &mut KineticTree, b: &mut KineticTree, time: f64) {
-        for tree in [&mut *a, &mut *b] {
+    fn end(&mut self, trees: &mut Trees<'_>, time: f64) {
+        for k in 0..trees.count() {
+            let tree = trees.get(k);
             tree.clock = time;
             tree.changes = None;
         }
-        self.known = Some(state_of([a, b]));
+        self.known = Some(state_of(trees.both()));
     }
 
-    fn next_time(&self, a: &KineticTree, b: &KineticTree) -> f64 {
-        a.next_time().min(b.next_time()).min(self.pairs.next_time())
+    fn next_time(&self, trees: &Trees<'_>) -> f64 {
+        let [a, b] = trees.both().map(KineticTree::next_time);
+        a.min(b).min(self.pairs.next_time())
     }
 
     /// Processes the next event: of the first tree, of the second one, or of the list.
-    fn step(&mut self, a: &mut KineticTree, b: &mut KineticTree) {
-        let next = self.next_time(a, b);
+    fn step(&mut self, trees: &mut Trees<'_>) {
+        let next = self.next_time(trees);
+        let [a, b] = trees.both();
         let now = next.max(a.clock).max(b.clock);
-        for tree in 0..2 {
-            let moved = if tree == 0 { &mut *a } else { &mut *b };
+        for k in 0..trees.count() {
+            let moved = trees.get(k);
             if moved.next_time() > next {
                 continue;
             }
             moved.step();
             let mut changes = moved.changes.take().unwrap_or_default();
+            // A single tree is both the first and the second one.
+            let roles = if trees.is_one() { 0..2 } else { k..k + 1 };
             for (node, sides) in changes.drain(..) {
-                self.pairs.node_changed(tree, node, sides, View { trees: [a, b], now });
+                for role in roles.clone() {
+                    self.pairs.node_changed(role, node, sides, View { trees: trees.both(), now });
+                }
             }
-            let moved = if tree == 0 { &mut *a } else { &mut *b };
-            moved.changes = Some(changes);
+            trees.get(k).changes = Some(changes);
             return;
         }
         self.events += 1;
-        self.pairs.step(View { trees: [a, b], now });
+        self.pairs.step(View { trees: trees.both(), now });
+    }
+}
+
+/// The node pairs of one kinetic tree that are apart, as [`SeparationList`] has those of two: which
+/// primitives of a deforming thing meet each other.
+///
+/// Each pair of primitives counts once. Primitives with common points, such as neighbouring triangles
+/// of a mesh, always overlap; it is for the caller to leave them out.
+///
+/// ```
+/// use nearmiss_kinetic::{FlightPlan, KineticTree, SelfSeparationList};
+///
+/// // Three points on a line; the first two move towards each other.
+/// let plans = [(0.0, 1.0), (4.0, -1.0), (9.0, 0.0)]
+///     .map(|(x, speed)| FlightPlan::linear(0.0, [x, 0.0, 0.0], [speed, 0.0, 0.0]).unwrap());
+/// let mut tree = KineticTree::of_points(0.0, plans.to_vec())?;
+/// let mut list = SelfSeparationList::new();
+/// list.advance(&mut tree, 2.0)?;
+/// let mut found = Vec::new();
+/// list.for_each_overlap(&tree, |i, j| found.push([i, j]));
+/// assert_eq!(found, [[0, 1]]);
+/// # Ok::<(), nearmiss_kinetic::KineticError>(())
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct SelfSeparationList(SeparationList);
+
+impl SelfSeparationList {
+    /// Creates a list. The first call compares the tree with itself from its root.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Returns the number of events of the list so far: pairs that met or parted.
+    #[must_use]
+    pub const fn events(&self) -> u64 {
+        self.0.events()
+    }
+
+    /// Returns the number of pairs that are apart, and of leaf pairs that meet, each leaf with itself
+    /// among them. Looks at all pairs.
+    #[must_use]
+    pub fn pair_counts(&self) -> [usize; 2] {
+        self.0.pair_counts()
+    }
+
+    /// Advances the tree and the list to `time`, in seconds.
+    ///
+    /// # Errors
+    /// [`KineticError::Past`] if `time` is before the clock of the tree, [`KineticError::Number`] if it is
+    /// not finite.
+    pub fn advance(&mut self, tree: &mut KineticTree, time: f64) -> Result<(), KineticError> {
+        self.0.advance_trees(&mut Trees::One(tree), time)
+    }
+
+    /// Advances the tree and the list to the earliest time, up to `until`, at which two primitives meet,
+    /// and returns it; to `until` if none do. `narrow` decides about two primitives, as in
+    /// [`SeparationList::next_contact`].
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance).
+    pub fn next_contact(
+        &mut self,
+        tree: &mut KineticTree,
+        until: f64,
+        mut narrow: impl FnMut(&KineticTree, [u32; 2], [f64; 2]) -> Option<f64>,
+    ) -> Result<Option<FirstContact>, KineticError> {
+        let mut narrow = |[tree, _]: [&KineticTree; 2], pair, span| narrow(tree, pair, span);
+        self.0.next_contact_of(&mut Trees::One(tree), until, &mut narrow)
+    }
+
+    /// Calls `visit` with each pair of primitives whose boxes now have a point in common, after a
+    /// call of [`advance`](Self::advance) or [`next_contact`](Self::next_contact) with this tree.
+    pub fn for_each_overlap(&self, tree: &KineticTree, visit: impl FnMut(u32, u32)) {
+        self.0.overlaps([tree; 2], true, visit);
+    }
+}
+
+/// Two trees, or one that is compared with itself.
+enum Trees<'a> {
+    One(&'a mut KineticTree),
+    Two([&'a mut KineticTree; 2]),
+}
+
+impl Trees<'_> {
+    /// Returns both trees; the same one twice if there is one.
+    fn both(&self) -> [&KineticTree; 2] {
+        match self {
+            Self::One(tree) => [tree; 2],
+            Self::Two([a, b]) => [a, b],
+        }
+    }
+
+    const fn is_one(&self) -> bool {
+        matches!(self, Self::One(_))
+    }
+
+    const fn count(&self) -> usize {
+        if self.is_one() { 1 } else { 2 }
+    }
+
+    const fn get(&mut self, k: usize) -> &mut KineticTree {
+        match self {
+            Self::One(tree) => tree,
+            Self::Two(trees) => trees[k],
+        }
     }
 }
 
@@ -200,16 +325,30 @@ fn state_of(trees: [&KineticTree; 2]) -> [(u64, u64); 2] {
     trees.map(|tree| (tree.edits, tree.clock.to_bits()))
 }
 
+/// Returns the pairs of primitives of two leaves. Those of a leaf with itself come once each.
+fn primitives<'a>(
+    trees: [&'a KineticTree; 2],
+    leaves: [u32; 2],
+    is_own: bool,
+) -> impl Iterator<Item = (u32, u32)> + use<'a> {
+    let [of_a, of_b] = [0, 1].map(|k| trees[k].nodes.primitives_of(leaves[k]));
+    let is_same = is_own && leaves[0] == leaves[1];
+    of_a.iter().enumerate().flat_map(move |(n, &i)| {
+        let others = if is_same { &of_b[n + 1..] } else { of_b };
+        others.iter().map(move |&j| (i, j))
+    })
+}
+
 /// Returns the earlier one of `best` and the first meeting of primitives of two leaves.
 fn narrowed(
-    trees: [&KineticTree; 2],
+    trees: &Trees<'_>,
     leaves: [u32; 2],
     [from, to]: [f64; 2],
     mut best: Option<FirstContact>,
     narrow: &mut impl FnMut([&KineticTree; 2], [u32; 2], [f64; 2]) -> Option<f64>,
 ) -> Option<FirstContact> {
-    let [of_a, of_b] = [0, 1].map(|k| trees[k].nodes.primitives_of(leaves[k]));
-    for (&i, &j) in of_a.iter().flat_map(|i| of_b.iter().map(move |j| (i, j))) {
+    let (is_own, trees) = (trees.is_one(), trees.both());
+    for (i, j) in primitives(trees, leaves, is_own) {
         let limit = best.map_or(to, |best| best.time.min(to));
         if let Some(time) = narrow(trees, [i, j], [from, limit])
             && time <= limit
@@ -254,6 +393,58 @@ mod tests {
         found.sort_unstable();
         expected.sort_unstable();
         assert_eq!(found, expected, "at {}", trees[0].clock());
+    }
+
+    /// The primitives under a node.
+    fn under(tree: &KineticTree, node: u32, found: &mut Vec<u32>) {
+        let link = tree.nodes.link(node);
+        if link.is_leaf() {
+            return found.extend(tree.nodes.primitives_of(node));
+        }
+        (0..2).for_each(|k| under(tree, link.children + k, found));
+    }
+
+    /// Checks that the pairs of a list cover every two primitives once, and are apart as they claim.
+    fn check_own(list: &SelfSeparationList, tree: &KineticTree) {
+        let mut covered = Vec::new();
+        list.0.pairs.for_each(|nodes, meets| {
+            let [a, b] = nodes.map(|node| tree.node_box(node));
+            let overlaps = (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k]);
+            assert_eq!(overlaps, meets, "nodes {nodes:?}");
+            let mut of = [Vec::new(), Vec::new()];
+            (0..2).for_each(|k| under(tree, nodes[k], &mut of[k]));
+            for (n, i) in of[0].iter().enumerate() {
+                let others = if nodes[0] == nodes[1] { &of[1][n + 1..] } else { &of[1][..] };
+                covered.extend(others.iter().map(|j| [*i.min(j), *i.max(j)]));
+            }
+        });
+        covered.sort_unstable();
+        let count = u32::try_from(tree.len()).unwrap();
+        let expected: Vec<[u32; 2]> = (0..count).flat_map(|i| (i + 1..count).map(move |j| [i, j])).collect();
+        assert!(covered == expected, "{} of {} pairs", covered.len(), expected.len());
+    }
+
+    #[test]
+    fn pairs_of_one_tree_cover_every_two_primitives_once() {
+        let rng = &mut rng(7);
+        for count in [1, 2, 5, 40, 150] {
+            let plan = |rng: &mut _| FlightPlan::linear(0.0, point_in(rng, 1.0), unit_vector(rng)).unwrap();
+            let plans: Vec<_> = (0..count).map(|_| plan(rng)).collect();
+            let mut tree = KineticTree::of_points(0.0, plans).unwrap();
+            let mut list = SelfSeparationList::new();
+            for step in 0..30_u32 {
+                let time = 0.05 * f64::from(step);
+                list.advance(&mut tree, time).unwrap();
+                check_own(&list, &tree);
+                if step % 10 == 9 {
+                    tree.set_plan(0, FlightPlan::linear(time, point_in(rng, 1.0), unit_vector(rng)).unwrap())
+                        .unwrap();
+                    list.advance(&mut tree, time).unwrap();
+                    check_own(&list, &tree);
+                }
+            }
+            assert!(count < 150 || list.events() > 100, "{} events", list.events());
+        }
     }
 
     #[test]

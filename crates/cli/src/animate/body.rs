@@ -23,15 +23,15 @@ use crate::picture::splat;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[non_exhaustive]
 pub enum AnimateMethod {
-    /// Refit, and rebuild when the bounding volumes are too loose; kinetic for two meshes with many
-    /// query times between files, if that is faster
+    /// Refit, and rebuild when the bounding volumes are too loose; kinetic for meshes with many query
+    /// times between files, if that is faster
     Auto,
     /// Refit the bounding volumes and keep the order of triangles or points
     Refit,
     /// Prepare every frame anew
     Rebuild,
     /// Update a box only when another point becomes extremal on one of its sides (Zachmann & Weller
-    /// 2006); for two meshes only
+    /// 2006); for meshes only
     Kinetic,
 }
 

@@ -1,7 +1,7 @@
-//! Two meshes under kinetic trees.
+//! Meshes under kinetic trees.
 
 use nearmiss::Mesh;
-use nearmiss::kinetic::{Counts, FlightPlan, KineticError, KineticTree, SeparationList};
+use nearmiss::kinetic::{Counts, FlightPlan, KineticError, KineticTree, SelfSeparationList, SeparationList};
 use nearmiss::mesh::triangles_meet;
 
 use super::body::{Found, Partner, Still};
@@ -11,26 +11,38 @@ use crate::console::now;
 use crate::error::CliError;
 use crate::mesh::two_meshes::micros_since;
 
-/// Two meshes whose boxes are kinetic, and the pairs of boxes that are apart.
-pub(super) struct KineticMeshes {
-    trees: [KineticTree; 2],
-    list: SeparationList,
+/// Meshes whose boxes are kinetic, and the pairs of boxes that are apart.
+pub(super) enum KineticMeshes {
+    Two {
+        trees: [KineticTree; 2],
+        list: SeparationList,
+    },
+    /// One mesh, tested against itself.
+    One {
+        tree: KineticTree,
+        list: SelfSeparationList,
+    },
 }
 
 impl KineticMeshes {
-    /// Builds both trees, and compares them. The frames are the knots of the vertices' plans.
+    /// Builds the trees, and compares them. The frames are the knots of the vertices' plans.
     pub(super) fn new(frames: &Frames, partner: Partner<'_>) -> Result<Self, CliError> {
+        let tree = of_frames(frames)?;
         let other = match partner {
-            Partner::Moving(others) => of_frames(others)?,
-            Partner::Still(Still::Mesh(mesh)) => of_still(mesh).map_err(|cause| fault(&cause))?,
-            Partner::Still(Still::Scan(_)) | Partner::Nothing => return Err(expected("no second mesh")),
+            Partner::Moving(others) => Some(of_frames(others)?),
+            Partner::Still(Still::Mesh(mesh)) => Some(of_still(mesh).map_err(|cause| fault(&cause))?),
+            Partner::Still(Still::Scan(_)) => return Err(expected("a scan")),
+            Partner::Nothing => None,
         };
-        let mut meshes = Self { trees: [of_frames(frames)?, other], list: SeparationList::new() };
+        let mut meshes = match other {
+            Some(other) => Self::Two { trees: [tree, other], list: SeparationList::new() },
+            None => Self::One { tree, list: SelfSeparationList::new() },
+        };
         meshes.advance(0.0)?;
         Ok(meshes)
     }
 
-    /// Moves both meshes to time `t`, and tests the triangles of leaves that meet.
+    /// Moves the meshes to time `t`, and tests the triangles of leaves that meet.
     pub(super) fn at(&mut self, t: f64) -> Result<Moment, CliError> {
         let before = self.work();
         let start = now();
@@ -52,32 +64,50 @@ impl KineticMeshes {
     }
 
     fn advance(&mut self, t: f64) -> Result<(), CliError> {
-        let [a, b] = &mut self.trees;
-        self.list.advance(a, b, t).map_err(|cause| fault(&cause))
+        match self {
+            Self::Two { trees: [a, b], list } => list.advance(a, b, t),
+            Self::One { tree, list } => list.advance(tree, t),
+        }
+        .map_err(|cause| fault(&cause))
     }
 
     /// Returns the numbers of changes of boxes and of events so far.
     fn work(&self) -> [u64; 2] {
-        let counts = self.trees.each_ref().map(KineticTree::counts);
-        let events: u64 = counts.iter().map(Counts::events).sum();
-        [counts.iter().map(|counts| counts.updates).sum(), events + self.list.events()]
+        let (trees, events) = match self {
+            Self::Two { trees, list } => (&trees[..], list.events()),
+            Self::One { tree, list } => (std::slice::from_ref(tree), list.events()),
+        };
+        let counts: Vec<Counts> = trees.iter().map(KineticTree::counts).collect();
+        let of_trees: u64 = counts.iter().map(Counts::events).sum();
+        [counts.iter().map(|counts| counts.updates).sum(), of_trees + events]
     }
 
-    /// Returns `true` if two triangles have a point in common.
+    /// Returns `true` if two triangles have a point in common. Those of one mesh that share a corner do
+    /// not count.
     fn meets(&self) -> bool {
-        let [a, b] = &self.trees;
-        let corners = |tree: &KineticTree, triangle: u32| {
-            let points = tree.primitive(triangle)?;
-            let [i, j, k] = [0, 1, 2].map(|n| tree.position(points[n]));
-            Some([i?, j?, k?])
-        };
         let mut meets = false;
-        self.list.for_each_overlap(a, b, |i, j| {
-            let pair = || Some(triangles_meet(&corners(a, i)?, &corners(b, j)?));
-            meets = meets || pair().unwrap_or(false);
-        });
+        match self {
+            Self::Two { trees: [a, b], list } => list.for_each_overlap(a, b, |i, j| {
+                meets = meets || Some(true) == pair_meets([a, b], [i, j]);
+            }),
+            Self::One { tree, list } => list.for_each_overlap(tree, |i, j| {
+                let corners = [i, j].map(|triangle| tree.primitive(triangle).unwrap_or_default());
+                let are_apart = !corners[0].iter().any(|corner| corners[1].contains(corner));
+                meets = meets || are_apart && Some(true) == pair_meets([tree; 2], [i, j]);
+            }),
+        }
         meets
     }
+}
+
+/// Returns `true` if a triangle of each tree have a point in common, `None` if there are no such triangles.
+fn pair_meets(trees: [&KineticTree; 2], [i, j]: [u32; 2]) -> Option<bool> {
+    let corners = |tree: &KineticTree, triangle: u32| {
+        let points = tree.primitive(triangle)?;
+        let [a, b, c] = [0, 1, 2].map(|n| tree.position(points[n]));
+        Some([a?, b?, c?])
+    };
+    Some(triangles_meet(&corners(trees[0], i)?, &corners(trees[1], j)?))
 }
 
 /// Builds the tree of a mesh in motion.
@@ -98,8 +128,8 @@ fn of_still(mesh: &Mesh) -> Result<KineticTree, KineticError> {
 
 fn expected(got: &str) -> CliError {
     CliError::Usage(format!(
-        "--method kinetic: expected two meshes, got {got}; use --method refit, or give frames with faces and a mesh \
-         to --against or --against-frames"
+        "--method kinetic: expected meshes, got {got}; use --method refit, or give frames with faces, and a mesh to \
+         --against or --against-frames"
     ))
 }
 

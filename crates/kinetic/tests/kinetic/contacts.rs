@@ -1,7 +1,7 @@
 //! Separation lists against loops over all pairs of primitives.
 
 use nearmiss_geometry::Aabb;
-use nearmiss_kinetic::{FirstContact, FlightPlan, KineticTree, SeparationList};
+use nearmiss_kinetic::{FirstContact, FlightPlan, KineticTree, SelfSeparationList, SeparationList};
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use rand::{Rng, RngExt};
 
@@ -44,6 +44,72 @@ fn overlaps_are_those_of_loops() {
             }
         }
     }
+}
+
+#[test]
+fn overlaps_of_one_tree_are_those_of_loops() {
+    let rng = &mut rng(24);
+    for motion in MOTIONS {
+        let mut model = Model::random(motion, 80, 2, rng);
+        let start = model.tree.clock();
+        let mut list = SelfSeparationList::new();
+        for step in 0..12_u32 {
+            let time = start + 0.25 * f64::from(step);
+            list.advance(&mut model.tree, time).unwrap();
+            let mut found = Vec::new();
+            list.for_each_overlap(&model.tree, |i, j| found.push([i.min(j), i.max(j)]));
+            found.sort_unstable();
+            let mut once = found.clone();
+            once.dedup();
+            assert_eq!(found, once, "{motion:?}: each pair once");
+            let alive = model.alive();
+            for (n, &i) in alive.iter().enumerate() {
+                for &j in &alive[n + 1..] {
+                    let depth = depth(&model.bounds(i), &model.bounds(j));
+                    let is_found = found.binary_search(&[i.min(j), i.max(j)]).is_ok();
+                    let is_right = if is_found { depth > -1e-11 } else { depth < 1e-11 };
+                    assert!(is_right, "{motion:?}: {i} and {j}, {depth} deep at {time}: {is_found}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn contacts_of_one_tree_are_the_earliest() {
+    let rng = &mut rng(25);
+    let mut hits = 0;
+    for round in 0..30 {
+        let (mut plans, mut pairs) = boxes(40, -1.3, rng);
+        let (others, _) = boxes(40, 1.3, rng);
+        pairs.extend((40..80_u32).map(|i| [2 * i, 2 * i + 1]));
+        plans.extend(others);
+        let mut tree = KineticTree::new(0.0, plans, &pairs).unwrap();
+        // Boxes of the same half may overlap from the start; those count between the halves only.
+        let across = |[i, j]: [u32; 2]| (i < 40) != (j < 40);
+        let mut expected: Option<f64> = None;
+        let mut late = tree.clone();
+        for [from, to] in [[0.0, 2.0], [2.0, 5.0]] {
+            late.advance(from).unwrap();
+            for (i, j) in (0..40).flat_map(|i| (40..80).map(move |j| (i, j))) {
+                let time = rigid([&late; 2], [i, j], [from, to]);
+                expected = expected.into_iter().chain(time).reduce(f64::min);
+            }
+        }
+        let mut list = SelfSeparationList::new();
+        let narrow =
+            |tree: &KineticTree, pair, span| if across(pair) { rigid([tree; 2], pair, span) } else { None };
+        let found = list.next_contact(&mut tree, 5.0, narrow).unwrap();
+        match (found, expected) {
+            (Some(found), Some(expected)) => {
+                hits += 1;
+                assert!((found.time - expected).abs() < 1e-9, "{round}: {found:?}, {expected}");
+                assert!(across(found.primitives), "{found:?}");
+            }
+            (found, expected) => assert!(found.is_none() && expected.is_none(), "{found:?}, {expected:?}"),
+        }
+    }
+    assert!(hits > 10, "{hits}");
 }
 
 /// Rigid boxes in linear motion with knots: two corners each.
