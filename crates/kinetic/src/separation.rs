@@ -91,15 +91,24 @@ impl SeparationList {
     }
 
     fn overlaps(&self, [a, b]: [&KineticTree; 2], is_own: bool, mut visit: impl FnMut(u32, u32)) {
-        let bounds = |tree: &KineticTree, primitive| tree.primitive_bounds(primitive);
+        let mut others = Vec::new();
         self.pairs.for_each(|nodes, meets| {
             if !meets {
                 return;
             }
-            for (i, j) in primitives([a, b], nodes, is_own) {
-                let (Some(own), Some(other)) = (bounds(a, i), bounds(b, j)) else { continue };
-                if (0..3).all(|k| own.min[k] <= other.max[k] && other.min[k] <= own.max[k]) {
-                    visit(i, j);
+            let of_b = b.nodes.primitives_of(nodes[1]);
+            others.clear();
+            others.extend(of_b.iter().map(|&j| (j, b.primitive_bounds(j))));
+            for (n, &i) in a.nodes.primitives_of(nodes[0]).iter().enumerate() {
+                let Some(own) = a.primitive_bounds(i) else { continue };
+                let others = if is_own && nodes[0] == nodes[1] { &others[n + 1..] } else { &others[..] };
+                for (j, other) in others {
+                    let overlaps = other.is_some_and(|other| {
+                        (0..3).all(|k| own.min[k] <= other.max[k] && other.min[k] <= own.max[k])
+                    });
+                    if overlaps {
+                        visit(i, *j);
+                    }
                 }
             }
         });
