@@ -30,8 +30,17 @@ pub fn map_all<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send)
 
 /// Maps consecutive chunks of items. For expensive `f`.
 pub fn chunks<T: Sync, R: Send>(items: &[T], f: impl Fn(&[T]) -> R + Sync + Send) -> Vec<R> {
+    chunks_with(items, || (), |(), items| f(items))
+}
+
+/// Like [`chunks`], with scratch memory as [`map_with`] has it.
+pub fn chunks_with<T: Sync, S, R: Send>(
+    items: &[T],
+    scratch: impl Fn() -> S + Sync + Send,
+    f: impl Fn(&mut S, &[T]) -> R + Sync + Send,
+) -> Vec<R> {
     const LENGTH: usize = 16;
-    ranges_with(items.len(), LENGTH, || (), |(), range| f(&items[range]))
+    ranges_with(items.len(), LENGTH, scratch, |scratch, range| f(scratch, &items[range]))
 }
 
 /// Maps each number below `count`. For expensive `f`: the numbers are scheduled one by one.
@@ -79,36 +88,39 @@ pub fn ranges_with<S, R: Send>(
 /// The number of results of [`in_order`] that are computed while those before are taken.
 const WAVE: usize = 1 << 9;
 
-/// Maps consecutive ranges that partition `0..count`, for expensive `f`. `take` receives the
-/// results in order, while later ones are computed. At most 1024 results are held at once.
-pub fn in_order<R: Send>(
+/// Maps consecutive ranges that partition `0..count`, for expensive `f`, with scratch memory as
+/// [`map_with`] has it. `take` receives the results in order, while later ones are computed. At most 1024
+/// results are held at once.
+pub fn in_order<S, R: Send>(
     count: usize,
-    f: impl Fn(Range<usize>) -> R + Sync + Send,
+    scratch: impl Fn() -> S + Sync + Send,
+    f: impl Fn(&mut S, Range<usize>) -> R + Sync + Send,
     mut take: impl FnMut(R) + Send,
 ) {
     const LENGTH: usize = 16;
     let runs = count.div_ceil(LENGTH);
-    let run = |k: usize| f(k * LENGTH..((k + 1) * LENGTH).min(count));
+    let run = |scratch: &mut S, k: usize| f(scratch, k * LENGTH..((k + 1) * LENGTH).min(count));
     let mut last = Vec::new();
     for wave in (0..runs).step_by(WAVE) {
-        let next = || map_each(WAVE.min(runs - wave), |k| run(wave + k));
+        let next = || map_with(WAVE.min(runs - wave), &scratch, |scratch, k| run(scratch, wave + k));
         last = both(next, || std::mem::take(&mut last).into_iter().for_each(&mut take)).0;
     }
     last.into_iter().for_each(take);
 }
 
 /// Writes the items that `f` returns for consecutive ranges of `0..count` into `out`, one after the
-/// other. For expensive `f`.
+/// other. For expensive `f`, with scratch memory as [`map_with`] has it.
 ///
 /// # Panics
 /// If `f` returns more items in all than `out` has.
-pub fn collect_into<T: Copy + Send>(
+pub fn collect_into<S, T: Copy + Send>(
     out: &mut [T],
     count: usize,
-    f: impl Fn(Range<usize>) -> Vec<T> + Sync + Send,
+    scratch: impl Fn() -> S + Sync + Send,
+    f: impl Fn(&mut S, Range<usize>) -> Vec<T> + Sync + Send,
 ) {
     let mut next = 0;
-    in_order(count, f, |some| {
+    in_order(count, scratch, f, |some| {
         out[next..next + some.len()].copy_from_slice(&some);
         next += some.len();
     });
@@ -314,7 +326,8 @@ mod tests {
         let mut next = 0;
         in_order(
             count,
-            |range| range,
+            || (),
+            |(), range| range,
             |range: Range<usize>| {
                 assert_eq!(range.start, next, "no run is left out");
                 next = range.end;
@@ -322,9 +335,9 @@ mod tests {
         );
         assert_eq!(next, count);
         let mut out = vec![0; 100];
-        collect_into(&mut out, 50, |range| range.flat_map(|i| [2 * i, 2 * i + 1]).collect());
+        collect_into(&mut out, 50, || (), |(), range| range.flat_map(|i| [2 * i, 2 * i + 1]).collect());
         assert_eq!(out, (0..100).collect::<Vec<_>>());
-        in_order(0, |_| (), |()| unreachable!("there is nothing to do"));
+        in_order(0, || (), |(), _| (), |()| unreachable!("there is nothing to do"));
     }
 
     #[test]

@@ -61,10 +61,10 @@ pub(crate) fn votes(
     let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(positions.len());
     let in_doubt = |block: &usize| of_block(*block).any(|i| fit(i).kind() == PointKind::Noisy);
     let mut changed = Vec::new();
-    let correct = |some: Range<usize>| {
-        let (mut found, mut changed) = (Nearest::default(), Vec::new());
+    let correct = |found: &mut Nearest, some: Range<usize>| {
+        let mut changed = Vec::new();
         for block in some.map(&block).filter(in_doubt) {
-            tree.nearest(level, block, VOTERS, &mut found);
+            tree.nearest(level, block, VOTERS, found);
             for i in of_block(block) {
                 let near = found.of(i % WIDTH).take(VOTERS).map(|n| n.id as usize);
                 let known = (|i: usize| positions[i], |i: usize| radii[i], &fit);
@@ -75,7 +75,7 @@ pub(crate) fn votes(
         }
         changed
     };
-    in_order(count, correct, |some| changed.extend(some));
+    in_order(count, Nearest::default, correct, |some| changed.extend(some));
     changed
 }
 

@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{chunks, collect_into, in_order};
+use nearmiss_lanes::parallel::{chunks, chunks_with, collect_into, in_order};
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
 use nearmiss_store::{Room, WorkError, Workspace};
@@ -144,13 +144,13 @@ pub(crate) fn fits(
 ) -> Result<Room<Fit>, WorkError> {
     let (topology, level) = (index.tree.topology, Level::new());
     let mut all = work.room(positions.len())?;
-    collect_into(&mut all, topology.leaves(), |leaves| {
-        let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
+    collect_into(&mut all, topology.leaves(), LeafScratch::default, |scratch, leaves| {
+        let mut fits = Vec::with_capacity(leaves.len() * topology.leaf_size());
         for number in leaves {
             let points = topology.points_of_leaf(number);
             let (positions, spacings) = (&positions[points.clone()], &spacings[points]);
             let look = |i: usize| spacings[i].look();
-            dispatch!(level, simd => fit(simd, index, positions, (look, gaps), &mut scratch, &mut fits));
+            dispatch!(level, simd => fit(simd, index, positions, (look, gaps), scratch, &mut fits));
         }
         fits
     });
@@ -165,13 +165,13 @@ pub(crate) fn fits_of(
     leaves: &[u32],
 ) -> Vec<Fit> {
     let level = Level::new();
-    let some = chunks(leaves, |leaves| {
-        let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
+    let some = chunks_with(leaves, LeafScratch::default, |scratch, leaves| {
+        let mut fits = Vec::with_capacity(leaves.len() * index.tree.topology.leaf_size());
         for number in leaves {
             let points = index.tree.topology.points_of_leaf(*number as usize);
             let (first, positions) = (points.start, &positions[points]);
             let look = |i: usize| looks(first + i);
-            dispatch!(level, simd => fit(simd, index, positions, (look, true), &mut scratch, &mut fits));
+            dispatch!(level, simd => fit(simd, index, positions, (look, true), scratch, &mut fits));
         }
         fits
     });
@@ -220,8 +220,8 @@ pub(crate) fn surfels(
 ) -> Result<Surfels, WorkError> {
     let Known { positions, radii, ordinary, reach, dense } = *known;
     let (topology, level) = (index.tree.topology, Level::new());
-    let some = |leaves: Range<usize>| {
-        let (mut scratch, mut surfels, mut some) = (LeafScratch::default(), Vec::new(), Some::default());
+    let some = |scratch: &mut LeafScratch, leaves: Range<usize>| {
+        let (mut surfels, mut some) = (Vec::new(), Some::default());
         for number in leaves {
             let (points, about) = leaf(index, number);
             let leaf =
@@ -230,7 +230,7 @@ pub(crate) fn surfels(
             let fits = &fits[points.clone()];
             surfels.clear();
             some.leaves.push(dispatch!(level, simd => {
-                leaf.look_about(simd, index, (fits, reach, is_dense), &mut scratch, &mut surfels)
+                leaf.look_about(simd, index, (fits, reach, is_dense), scratch, &mut surfels)
             }));
             for ((i, &radius), surfel) in points.zip(leaf.radii).zip(&surfels) {
                 let kind = surfel.code.kind();
@@ -249,7 +249,7 @@ pub(crate) fn surfels(
         leaves: work.room(leaves)?,
         obstacles: work.room(leaves)?,
     };
-    all.fill(|take| in_order(leaves, some, take));
+    all.fill(|take| in_order(leaves, LeafScratch::default, some, take));
     Ok(all)
 }
 

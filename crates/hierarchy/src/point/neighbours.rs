@@ -283,8 +283,8 @@ pub(crate) fn neighbours(
     work: &Workspace,
 ) -> Result<(Room<NeighbourList>, Room<u32>), WorkError> {
     let level = Level::new();
-    let some = |blocks: Range<usize>| {
-        let (mut locality, mut lists) = (Locality::default(), Lists::default());
+    let some = |locality: &mut Locality, blocks: Range<usize>| {
+        let mut lists = Lists::default();
         for block in blocks {
             let first = block * PointBlock::WIDTH;
             let points = first..(first + PointBlock::WIDTH).min(positions.len());
@@ -303,7 +303,7 @@ pub(crate) fn neighbours(
     // More memory than most scans need; it grows if a scan needs more.
     let mut entries = work.room(blocks * USUAL_ENTRIES)?;
     let (mut list, mut end, mut failed) = (0, 0, None);
-    in_order(blocks, some, |some| {
+    in_order(blocks, Locality::default, some, |some| {
         let shift = u32::try_from(end).unwrap_or(u32::MAX);
         for of_block in some.lists {
             lists[list] = NeighbourList { first: of_block.first.saturating_add(shift), ..of_block };

@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_index::{BlockTree, Nearest, PointBlock};
-use nearmiss_lanes::parallel::{change_both, chunks, collect_into, in_order};
+use nearmiss_lanes::parallel::{change_both, chunks_with, collect_into, in_order};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::symmetric_eigen;
 
@@ -90,8 +90,9 @@ pub(crate) fn spacings(
     let mut room = work.room(points.len())?;
     let spacings: &mut [Spacing] = &mut room;
     let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(points.len());
-    collect_into(spacings, tree.blocks().len(), |blocks| {
-        let (mut search, mut spacings) = (Search::new(tree, points), Vec::new());
+    let search = || Search::new(tree, points);
+    collect_into(spacings, tree.blocks().len(), search, |search, blocks| {
+        let mut spacings = Vec::with_capacity(blocks.len() * WIDTH);
         for block in blocks {
             search.start(block);
             let plain = search.plain(neighbours);
@@ -106,8 +107,8 @@ pub(crate) fn spacings(
     let mut votes = work.room::<u8>(points.len())?;
     let counted: &mut [u8] = &mut votes;
     let found = &*spacings;
-    let vote = |blocks: Range<usize>| {
-        let (mut search, mut nearby) = (Search::new(tree, points), Vec::new());
+    let vote = |search: &mut Search<'_>, blocks: Range<usize>| {
+        let mut nearby = Vec::new();
         for block in blocks.filter(|&block| found[of_block(block)].iter().any(|s| s.look() != Look::Area)) {
             search.start(block);
             for i in of_block(block).filter(|&i| found[i].look() != Look::Area) {
@@ -117,7 +118,7 @@ pub(crate) fn spacings(
         }
         nearby
     };
-    in_order(tree.blocks().len(), vote, |nearby| {
+    in_order(tree.blocks().len(), search, vote, |nearby| {
         for j in nearby {
             counted[j] = counted[j].saturating_add(1);
         }
@@ -140,26 +141,30 @@ pub(crate) fn spacings_of(
     radii: &[f32],
     blocks: &[u32],
 ) -> Vec<(Spacing, f32)> {
-    let some = chunks(blocks, |blocks| {
-        let (mut search, mut found) = (Search::new(tree, points), Vec::new());
-        for block in blocks {
-            let first = *block as usize * WIDTH;
-            search.start(*block as usize);
-            let plain = search.plain(neighbours);
-            for i in first..first + WIDTH {
-                if i >= points.len() {
-                    found.push((Spacing::default(), 0.0));
-                    continue;
+    let some = chunks_with(
+        blocks,
+        || Search::new(tree, points),
+        |search, blocks| {
+            let mut found = Vec::with_capacity(blocks.len() * WIDTH);
+            for block in blocks {
+                let first = *block as usize * WIDTH;
+                search.start(*block as usize);
+                let plain = search.plain(neighbours);
+                for i in first..first + WIDTH {
+                    if i >= points.len() {
+                        found.push((Spacing::default(), 0.0));
+                        continue;
+                    }
+                    let mut spacing = search.spacing(i, neighbours, plain);
+                    let smooth = |least: f32, n: (f64, usize)| least.min(radii[n.1] + GROWTH * length(&n));
+                    let mut radius = search.nearest(i, neighbours).fold(spacing.radius, smooth);
+                    limit(std::slice::from_mut(&mut spacing), std::slice::from_mut(&mut radius), reach);
+                    found.push((spacing, radius));
                 }
-                let mut spacing = search.spacing(i, neighbours, plain);
-                let smooth = |least: f32, n: (f64, usize)| least.min(radii[n.1] + GROWTH * length(&n));
-                let mut radius = search.nearest(i, neighbours).fold(spacing.radius, smooth);
-                limit(std::slice::from_mut(&mut spacing), std::slice::from_mut(&mut radius), reach);
-                found.push((spacing, radius));
             }
-        }
-        found
-    });
+            found
+        },
+    );
     some.into_iter().flatten().collect()
 }
 
@@ -388,21 +393,27 @@ pub(crate) fn smooth(
     let mut tips = work.room(tree.blocks().len())?;
     let (cones, level) = (tree.cones(&mut tips, tip, GROWTH), Level::new());
     let mut radii = work.room(spacings.len())?;
-    collect_into(&mut radii, tree.blocks().len(), |blocks| {
-        let mut radii = Vec::with_capacity(blocks.len() * WIDTH);
-        for block in blocks {
-            let first = block * WIDTH;
-            let own = &spacings[first..(first + WIDTH).min(spacings.len())];
-            let mut heights = [0.0; WIDTH];
-            for (height, own) in heights.iter_mut().zip(own) {
-                *height = if own.look() == Look::Bend { f32::MAX } else { own.radius };
+    collect_into(
+        &mut radii,
+        tree.blocks().len(),
+        || (),
+        |(), blocks| {
+            let mut radii = Vec::with_capacity(blocks.len() * WIDTH);
+            for block in blocks {
+                let first = block * WIDTH;
+                let own = &spacings[first..(first + WIDTH).min(spacings.len())];
+                let mut heights = [0.0; WIDTH];
+                for (height, own) in heights.iter_mut().zip(own) {
+                    *height = if own.look() == Look::Bend { f32::MAX } else { own.radius };
+                }
+                let lowest = cones.below(level, block, &heights);
+                let radius =
+                    |(own, lowest): (&Spacing, f32)| if lowest < f32::MAX { lowest } else { own.radius };
+                radii.extend(own.iter().zip(lowest).map(radius));
             }
-            let lowest = cones.below(level, block, &heights);
-            let radius = |(own, lowest): (&Spacing, f32)| if lowest < f32::MAX { lowest } else { own.radius };
-            radii.extend(own.iter().zip(lowest).map(radius));
-        }
-        radii
-    });
+            radii
+        },
+    );
     Ok(radii)
 }
 
