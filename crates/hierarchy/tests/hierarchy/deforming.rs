@@ -121,7 +121,7 @@ fn parameters() -> Parameters {
 fn a_moved_scan_is_valid_in_every_frame() {
     let (mut found, mut compared) = ([0; 2], 0);
     for (kind, points, size) in clouds() {
-        for leaf_size in [16, 10] {
+        for leaf_size in [16, 10, 24, 64] {
             let options = BuildOptions::default().with_leaf_size(leaf_size);
             let Ok(mut scan) = DeformingScan::new(&points, &options) else { continue };
             for (number, (name, frame)) in (0..).zip(frames(&points, size, 4)) {
