@@ -14,7 +14,7 @@ use crate::mesh::two_meshes::micros_since;
 /// Meshes whose boxes are kinetic, and the pairs of boxes that are apart.
 pub(super) enum KineticMeshes {
     Two {
-        trees: [KineticTree; 2],
+        trees: Box<[KineticTree; 2]>,
         list: SeparationList,
     },
     /// One mesh, tested against itself.
@@ -35,7 +35,7 @@ impl KineticMeshes {
             Partner::Nothing => None,
         };
         let mut meshes = match other {
-            Some(other) => Self::Two { trees: [tree, other], list: SeparationList::new() },
+            Some(other) => Self::Two { trees: Box::new([tree, other]), list: SeparationList::new() },
             None => Self::One { tree, list: SelfSeparationList::new() },
         };
         meshes.advance(0.0)?;
@@ -65,7 +65,10 @@ impl KineticMeshes {
 
     fn advance(&mut self, t: f64) -> Result<(), CliError> {
         match self {
-            Self::Two { trees: [a, b], list } => list.advance(a, b, t),
+            Self::Two { trees, list } => {
+                let [a, b] = &mut **trees;
+                list.advance(a, b, t)
+            }
             Self::One { tree, list } => list.advance(tree, t),
         }
         .map_err(|cause| fault(&cause))
@@ -87,9 +90,12 @@ impl KineticMeshes {
     fn meets(&self) -> bool {
         let mut meets = false;
         match self {
-            Self::Two { trees: [a, b], list } => list.for_each_overlap(a, b, |i, j| {
-                meets = meets || Some(true) == pair_meets([a, b], [i, j]);
-            }),
+            Self::Two { trees, list } => {
+                let [a, b] = &**trees;
+                list.for_each_overlap(a, b, |i, j| {
+                    meets = meets || Some(true) == pair_meets([a, b], [i, j]);
+                });
+            }
             Self::One { tree, list } => list.for_each_overlap(tree, |i, j| {
                 let corners = [i, j].map(|triangle| tree.primitive(triangle).unwrap_or_default());
                 let are_apart = !corners[0].iter().any(|corner| corners[1].contains(corner));
