@@ -19,7 +19,7 @@ pub(super) enum KineticMeshes {
     },
     /// One mesh, tested against itself.
     One {
-        tree: KineticTree,
+        tree: Box<KineticTree>,
         list: SelfSeparationList,
     },
 }
@@ -36,7 +36,7 @@ impl KineticMeshes {
         };
         let mut meshes = match other {
             Some(other) => Self::Two { trees: Box::new([tree, other]), list: SeparationList::new() },
-            None => Self::One { tree, list: SelfSeparationList::new() },
+            None => Self::One { tree: Box::new(tree), list: SelfSeparationList::new() },
         };
         meshes.advance(0.0)?;
         Ok(meshes)
@@ -78,7 +78,7 @@ impl KineticMeshes {
     fn work(&self) -> [u64; 2] {
         let (trees, events) = match self {
             Self::Two { trees, list } => (&trees[..], list.events()),
-            Self::One { tree, list } => (std::slice::from_ref(tree), list.events()),
+            Self::One { tree, list } => (std::slice::from_ref(&**tree), list.events()),
         };
         let counts: Vec<Counts> = trees.iter().map(KineticTree::counts).collect();
         let of_trees: u64 = counts.iter().map(Counts::events).sum();
