@@ -279,7 +279,7 @@ mod tests {
             std::array::from_fn(|_| std::array::from_fn(|_| unit_vector(rng)[0] as f32));
         let found = dispatch!(Level::new(), simd => {
             let lanes = rows.map(|row| f32x16::load_array(simd, row));
-            (least_of_each(lanes), greatest_of_each(lanes), lanes.map(|lanes| sum(lanes)))
+            (least_of_each(lanes), greatest_of_each(lanes), lanes.map(sum))
         });
         let fold = |f: fn(f32, f32) -> f32| rows.map(|row| row.into_iter().reduce(f).unwrap());
         assert_eq!((found.0, found.1), (fold(f32::min), fold(f32::max)));
