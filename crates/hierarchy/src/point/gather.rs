@@ -104,23 +104,11 @@ impl Supports {
     fn collect<S: Simd>(&self, simd: S, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
         let (mut lanes, mut counts) = ([[0; PointBlock::WIDTH]; Self::MOST_LEVELS], [0; Self::MOST_LEVELS]);
         let top = self.levels.len();
-        let below = |level: usize, id: u32, lanes: &mut [u32; PointBlock::WIDTH]| {
-            let count = self.levels[level][id as usize].supporting(
-                simd,
-                x,
-                distance,
-                id * id32(PointBlock::WIDTH),
-                lanes,
-            );
-            // The last one is taken first.
-            lanes[..count].reverse();
-            count
-        };
         if top == 0 {
             return found.push(0);
         }
         let mut level = top - 1;
-        counts[level] = below(level, 0, &mut lanes[level]);
+        counts[level] = self.below(simd, (level, 0), (x, distance), &mut lanes[level]);
         while level < top {
             let Some(left) = counts[level].checked_sub(1) else {
                 level += 1;
@@ -132,9 +120,25 @@ impl Supports {
                 found.push(id);
             } else {
                 level -= 1;
-                counts[level] = below(level, id, &mut lanes[level]);
+                counts[level] = self.below(simd, (level, id), (x, distance), &mut lanes[level]);
             }
         }
+    }
+
+    /// Finds the balls of a block of a level that come within `distance` of `x`, the last one first.
+    /// Returns their number.
+    #[inline(always)]
+    fn below<S: Simd>(
+        &self,
+        simd: S,
+        (level, id): (usize, u32),
+        (x, distance): ([f32; 3], f32),
+        lanes: &mut [u32; PointBlock::WIDTH],
+    ) -> usize {
+        let (block, first) = (&self.levels[level][id as usize], id * id32(PointBlock::WIDTH));
+        let count = block.supporting(simd, x, distance, first, lanes);
+        lanes[..count].reverse();
+        count
     }
 }
 

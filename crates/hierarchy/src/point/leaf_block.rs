@@ -278,7 +278,9 @@ impl LeafParts<'_> {
         let blocks_a_leaf = Self::blocks_a_leaf(topology);
         let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
         let mut parts = runs(topology.points_of_leaf(leaf)).skip(part);
-        parts.next().map_or(LeafBlock::new(bounds), |points| LeafBlock::of(simd, &self.lanes(points), bounds))
+        // No closure: it may be compiled without the instruction set of the caller.
+        let Some(points) = parts.next() else { return LeafBlock::new(bounds) };
+        LeafBlock::of(simd, &self.lanes(points), bounds)
     }
 
     /// Returns up to sixteen points of a leaf, at least one.

@@ -1,7 +1,7 @@
 //! Validation of the leaf blocks: one that does not match its points gives false contacts.
 
 use bytemuck::bytes_of;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_lanes::parallel::ranges;
 
 use crate::scan::build::PointHierarchy;
@@ -16,7 +16,10 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         leaves.find(|&leaf| {
             let bounds = scan.tree().bounds(topology.leaf(leaf));
             let is_other = |number: usize| {
-                let block = dispatch!(level, simd => parts.block(simd, topology, number, &bounds));
+                let block = dispatch!(level, simd => simd.vectorize(
+                    #[inline(always)]
+                    || parts.block(simd, topology, number, &bounds),
+                ));
                 bytes_of(&stored[number]) != bytes_of(&block)
             };
             let mut blocks = leaf * blocks_a_leaf..(leaf + 1) * blocks_a_leaf;
