@@ -19,7 +19,7 @@ use nearmiss_lanes::wide::{along, greatest, greatest_of_each, least_of_each, loa
 use crate::bounds::boxes::{OrientedBox, ROUNDING};
 use crate::bounds::growth::Growth;
 use crate::point::kind::{SLAB, THICKNESS, ball, cell_radius, is_on_sheet, obstacle_ball};
-use crate::point::leaf_block::{DiscLanes, LeafBlock, LeafParts, WIDTH, runs};
+use crate::point::leaf_block::{DiscLanes, LeafBlock, LeafParts, WIDTH, sixteens};
 use crate::tree::topology::{FAN, MOST_LEAF_POINTS, Topology};
 
 /// The number of bottoms that a thread takes at once.
@@ -124,7 +124,7 @@ impl Low<'_> {
             let mut count = 0;
             for leaf in leaves_under(topology, item) {
                 let (start, points) = (count, topology.points_of_leaf(leaf));
-                for points in runs(points) {
+                for points in sixteens(points) {
                     lanes[count] = PartLanes::of(points, parts);
                     count += 1;
                 }

@@ -186,7 +186,7 @@ fn repeated<T: Copy>(items: &[T]) -> [T; WIDTH] {
 
 /// Returns the points of a leaf in runs of sixteen; the last may be shorter.
 #[inline(always)]
-pub(crate) fn runs(points: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+pub(crate) fn sixteens(points: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     points.clone().step_by(WIDTH).map(move |first| first..points.end.min(first + WIDTH))
 }
 
@@ -277,7 +277,7 @@ impl LeafParts<'_> {
     ) -> LeafBlock {
         let blocks_a_leaf = Self::blocks_a_leaf(topology);
         let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
-        let mut parts = runs(topology.points_of_leaf(leaf)).skip(part);
+        let mut parts = sixteens(topology.points_of_leaf(leaf)).skip(part);
         // No closure: it may be compiled without the instruction set of the caller.
         let Some(points) = parts.next() else { return LeafBlock::new(bounds) };
         LeafBlock::of(simd, &self.lanes(points), bounds)

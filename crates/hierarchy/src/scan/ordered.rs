@@ -26,7 +26,7 @@ use crate::tree::wide::Tree;
 /// Points in order, with their classes.
 pub(crate) struct Ordered {
     pub(crate) topology: Topology,
-    /// The boxes around the points alone, in the order of the nodes' ids.
+    /// The boxes around the points alone, in the order of the nodes' ids; empty if an order was kept.
     pub(crate) boxes: Room<OrientedBox>,
     pub(crate) positions: Room<[f32; 3]>,
     /// The indices of the points in the input.
