@@ -256,16 +256,27 @@ impl<'a> Elements<'a> {
 
     /// A lower bound on the distance of a core from the obstacle near a point.
     pub(crate) fn cell_gap(&self, solid: &Solid<'_>, i: usize) -> f64 {
-        let reach = f64::from(self.arrays.obstacle_reach(i));
-        let centre = self.position(i);
+        let (centre, reach) = (self.position(i), f64::from(self.arrays.obstacle_reach(i)));
         let by_ball = solid.distance(&centre) * (1.0 - 1e-9) - reach;
-        if !self.arrays.is_on_sheet(i) {
-            return by_ball;
+        let Some((disc, slab)) = self.cell(i, centre, reach) else { return by_ball };
+        by_ball.max(solid.gap(&disc, f64::INFINITY).lower - slab)
+    }
+
+    /// Returns `true` if the obstacle near a point is proven to be further than `within` from a core.
+    pub(crate) fn is_cell_beyond(&self, solid: &Solid<'_>, i: usize, within: f64) -> bool {
+        let (centre, reach) = (self.position(i), f64::from(self.arrays.obstacle_reach(i)));
+        if solid.distance(&centre) * (1.0 - 1e-9) - reach > within {
+            return true;
         }
-        let disc = FlatDisc { centre, normal: self.normal(i), radius: reach };
-        by_ball.max(
-            solid.gap(&disc, f64::INFINITY).lower - f64::from(SLAB * self.arrays.radii[i]) * (1.0 + 1e-6),
-        )
+        let cell = self.cell(i, centre, reach);
+        cell.is_some_and(|(disc, slab)| solid.is_beyond(&disc, (within + slab) * (1.0 + 1e-9)))
+    }
+
+    /// A disc and a distance from it within which the obstacle near a point on a sheet is.
+    fn cell(&self, i: usize, centre: Vector, radius: f64) -> Option<(FlatDisc, f64)> {
+        let slab = f64::from(SLAB * self.arrays.radii[i]) * (1.0 + 1e-6);
+        let disc = || FlatDisc { centre, normal: self.normal(i), radius };
+        self.arrays.is_on_sheet(i).then(|| (disc(), slab))
     }
 
     /// Compares a core with the points of a block of a leaf, given by its number.

@@ -1,5 +1,7 @@
 //! The test whether a core is near a disc, without their nearest points.
 
+use std::ops::ControlFlow;
+
 use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::leaf::disc_triangle::FlatDisc;
@@ -10,31 +12,50 @@ const ROUNDS: u32 = 12;
 
 impl Solid<'_> {
     /// Returns a point of the disc that is at most `within` from the core, if there is one.
+    pub(crate) fn reaches(&self, disc: &FlatDisc, within: f64) -> Option<Vector3<f64>> {
+        match self.project(disc, within) {
+            ControlFlow::Break(found) => found,
+            ControlFlow::Continue(()) => {
+                let gap = self.gap(disc, within);
+                if gap.distance > within { None } else { Some(gap.on_disc) }
+            }
+        }
+    }
+
+    /// Returns `true` if a plane proves that the disc is further than `within` from the core.
+    pub(crate) fn is_beyond(&self, disc: &FlatDisc, within: f64) -> bool {
+        match self.project(disc, within) {
+            ControlFlow::Break(found) => found.is_none(),
+            ControlFlow::Continue(()) => self.gap(disc, within).lower > within,
+        }
+    }
+
+    /// Decides whether a point of the disc is at most `within` from the core, and returns it.
     ///
     /// Projects a point from one onto the other and back. Each pair of points is an upper bound of the
     /// distance, and the plane across the way between them gives a lower one. Most discs are decided in
     /// the first round.
-    pub(crate) fn reaches(&self, disc: &FlatDisc, within: f64) -> Option<Vector3<f64>> {
+    fn project(&self, disc: &FlatDisc, within: f64) -> ControlFlow<Option<Vector3<f64>>> {
+        if !self.has_projection() {
+            return ControlFlow::Continue(());
+        }
         let within_sq = within * within;
-        if self.has_projection() {
-            let mut on_core = self.nearest(&disc.centre);
-            for _ in 0..ROUNDS {
-                let on_disc = disc.nearest(&on_core);
-                on_core = self.nearest(&on_disc);
-                let way = on_core - on_disc;
-                let square = way.norm_squared();
-                if square <= within_sq {
-                    return Some(on_disc);
-                }
-                // The core is beyond the plane through its point.
-                let apart = way.dot(&(on_core - disc.centre - disc.rim(&way)));
-                if apart > 0.0 && apart * apart > within_sq * square {
-                    return None;
-                }
+        let mut on_core = self.nearest(&disc.centre);
+        for _ in 0..ROUNDS {
+            let on_disc = disc.nearest(&on_core);
+            on_core = self.nearest(&on_disc);
+            let way = on_core - on_disc;
+            let square = way.norm_squared();
+            if square <= within_sq {
+                return ControlFlow::Break(Some(on_disc));
+            }
+            // The core is beyond the plane through its point.
+            let apart = way.dot(&(on_core - disc.centre - disc.rim(&way)));
+            if apart > 0.0 && apart * apart > within_sq * square {
+                return ControlFlow::Break(None);
             }
         }
-        let gap = self.gap(disc, within);
-        if gap.distance > within { None } else { Some(gap.on_disc) }
+        ControlFlow::Continue(())
     }
 }
 
@@ -73,6 +94,10 @@ mod tests {
             for within in close {
                 let found = solid.reaches(&disc, within);
                 assert_eq!(found.is_some(), distance <= within, "{shape:?} {disc:?} {within}");
+                // Between the bounds of a search, neither is proven.
+                if (distance - within).abs() > 1e-7 {
+                    assert_eq!(solid.is_beyond(&disc, within), found.is_none(), "{shape:?} {disc:?} {within}");
+                }
                 let Some(point) = found else {
                     far += 1;
                     continue;

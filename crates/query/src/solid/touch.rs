@@ -175,8 +175,10 @@ impl PlaceVisitor for Touch<'_, '_> {
             {
                 let within = elements.margin + self.near.solid.radius;
                 for lane in Bits(Elements::within(simd, (&gaps.cells, count), self.near.most)) {
-                    let gap = elements.cell_gap(self.near.solid, first + lane);
-                    self.doubtful |= gap.is_nan() || gap <= within;
+                    self.doubtful = !elements.is_cell_beyond(self.near.solid, first + lane, within);
+                    if self.doubtful {
+                        break;
+                    }
                 }
             }
         }
