@@ -2,5 +2,6 @@
 
 pub(crate) mod mesh;
 pub(crate) mod mesh_distance;
+pub(crate) mod mesh_penetration;
 pub(crate) mod scan;
 pub(crate) mod shapes;

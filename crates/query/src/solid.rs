@@ -16,6 +16,7 @@ pub(crate) mod hint;
 pub(crate) mod inner;
 pub(crate) mod lanes;
 pub(crate) mod meeting;
+pub(crate) mod overlap;
 pub(crate) mod place;
 pub(crate) mod placed;
 pub(crate) mod plan;

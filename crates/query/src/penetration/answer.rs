@@ -17,9 +17,9 @@ pub enum Interior {
     Solid,
 }
 
-/// The penetration of two meshes, two scans, or a scan and a mesh or a shape, in world units: lower ≤ length
-/// of the least shift that separates them ≤ upper. Of two alike b is shifted; otherwise the mesh or the
-/// shape.
+/// The penetration of two scans, meshes or convex shapes, or of two different ones of these, in world units:
+/// lower ≤ length of the least shift that separates them ≤ upper. Of two alike b is shifted; otherwise the
+/// shape or, if there is none, the mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penetration {
     /// A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found.
@@ -31,10 +31,10 @@ pub struct Penetration {
     pub upper: f64,
     /// The unit vector along which the shift of length [`Self::upper`] is. 0 if none is needed or known.
     pub direction: [f64; 3],
-    /// The evidence for the separation after that shift. Certified for meshes, which are exact. The shortest
+    /// The evidence for the separation after that shift. Certified without a scan. The shortest
     /// shift out of a scan ends next to its surface, where most separations are estimated.
     pub evidence: Evidence,
-    /// The length below which the scans do not determine the separation after the shift; 0 for meshes.
+    /// The length below which the scans do not determine the separation after the shift; 0 without a scan.
     pub band: f64,
     /// `true` if the search ended before the budget did. The bounds may still differ.
     pub complete: bool,

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{MeshView, Part, PlaceVisitor, Siblings};
+use nearmiss_hierarchy::{MeshHierarchy, MeshView, Part, PlaceVisitor, Siblings};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::placed::PlacedMesh;
@@ -28,21 +28,46 @@ pub struct ShapeMeshDistance {
     pub triangle: u32,
 }
 
-/// The search for the nearest triangle, in the stored frame of the mesh.
-struct Search<'s, 'a> {
+/// A descent to the triangles near a shape, in the stored frame of the mesh.
+struct Search<'s, 'a, V> {
     view: &'s MeshView<'a>,
     /// The origin and the scale of the stored frame, in the frame of the mesh's input.
     origin: Vector,
     scale: f64,
     solid: &'s Solid<'s>,
     lane_box: LaneBox,
-    /// The least distance of the shape so far, or the distance up to which triangles are of interest.
-    upper: f64,
-    /// The least lower bound of any triangle that was compared.
-    lower: f64,
-    best: Option<(usize, Closest)>,
+    /// The distance of the shape up to which triangles are of interest.
+    within: f64,
     /// The squared distance of the core beyond which boxes are skipped.
     most_sq: f32,
+    visit: V,
+}
+
+/// Calls `visit` with each triangle that may be within a distance of `solid`, which is in the mesh's stored
+/// frame: with its place in the tree, its corners, and the points of both nearest to each other. `visit`
+/// returns the distance up to which further triangles are of interest, or ends the descent.
+pub(crate) fn visit_near(
+    mesh: &MeshHierarchy,
+    view: &MeshView<'_>,
+    (solid, within): (&Solid<'_>, f64),
+    level: Level,
+    visit: impl FnMut(usize, &[Vector; 3], &Closest) -> ControlFlow<(), f64>,
+) -> ControlFlow<()> {
+    let (frame, root) = (mesh.frame(), view.tree.root_box());
+    let far = Vector3::from(root.centre).amax() + root.radius();
+    let mut search = Search {
+        view,
+        origin: frame.origin.into(),
+        scale: frame.scale,
+        solid,
+        lane_box: LaneBox::new(solid, f64::from(far)),
+        within: f64::INFINITY,
+        most_sq: f32::INFINITY,
+        visit,
+    };
+    search.limit(within);
+    let centre = search.lane_box.centre;
+    view.tree.descend_to(level, centre, &mut search)
 }
 
 /// Bounds the distance of a mesh and `solid`, which is in the mesh's stored frame, up to `within` in the
@@ -53,25 +78,18 @@ pub(crate) fn distance(
     within: f64,
     level: Level,
 ) -> Option<ShapeMeshDistance> {
-    let (view, frame, to_world) = (mesh.mesh().arrays(), mesh.mesh().frame(), mesh.stored_to_world());
-    let root = view.tree.root_box();
-    let far = Vector3::from(root.centre).amax() + root.radius();
-    let mut search = Search {
-        view: &view,
-        origin: frame.origin.into(),
-        scale: frame.scale,
-        solid,
-        lane_box: LaneBox::new(solid, f64::from(far)),
-        upper: f64::INFINITY,
-        lower: f64::INFINITY,
-        best: None,
-        most_sq: f32::INFINITY,
-    };
-    search.limit(within / to_world.scale());
+    let (view, to_world) = (mesh.mesh().arrays(), mesh.stored_to_world());
+    let (mut upper, mut lower, mut best) = (f64::INFINITY, f64::INFINITY, None);
+    let limit = within / to_world.scale();
     // Ends early if they touch.
-    let centre = search.lane_box.centre;
-    let _touching = view.tree.descend_to(level, centre, &mut search);
-    let Search { upper, lower, best, .. } = search;
+    let _touching = visit_near(mesh.mesh(), &view, (solid, limit), level, |i, _, found| {
+        let distance = (found.distance - solid.radius).max(0.0);
+        lower = lower.min(found.lower - solid.radius);
+        if distance < upper {
+            (upper, best) = (distance, Some((i, *found)));
+        }
+        if upper == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(upper.min(limit)) }
+    });
     let upper = upper * to_world.scale();
     let (triangle, Closest { points: [on_core, on_mesh], distance, .. }) =
         best.filter(|_| upper <= within)?;
@@ -86,10 +104,11 @@ pub(crate) fn distance(
     })
 }
 
-impl Search<'_, '_> {
+impl<V: FnMut(usize, &[Vector; 3], &Closest) -> ControlFlow<(), f64>> Search<'_, '_, V> {
     /// Limits the search to this distance of the shape.
     #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
     fn limit(&mut self, distance: f64) {
+        self.within = distance;
         if self.lane_box.is_near {
             let most = ((distance + self.solid.radius) as f32).next_up() + self.lane_box.slack;
             self.most_sq = (most * most).next_up();
@@ -97,20 +116,18 @@ impl Search<'_, '_> {
     }
 
     /// Compares the shape with a triangle.
-    fn compare(&mut self, i: usize) {
-        let radius = self.solid.radius;
+    fn compare(&mut self, i: usize) -> ControlFlow<()> {
         let corners = self.view.corners(i).map(|corner| (Vector::from(corner) - self.origin) / self.scale);
-        let found = self.solid.triangle_gap(&corners, self.upper + radius);
-        let distance = (found.distance - radius).max(0.0);
-        self.lower = self.lower.min(found.lower - radius);
-        if distance < self.upper {
-            (self.upper, self.best) = (distance, Some((i, found)));
-            self.limit(distance);
+        let found = self.solid.triangle_gap(&corners, self.within + self.solid.radius);
+        let within = (self.visit)(i, &corners, &found)?;
+        if within < self.within {
+            self.limit(within);
         }
+        ControlFlow::Continue(())
     }
 }
 
-impl PlaceVisitor for Search<'_, '_> {
+impl<V: FnMut(usize, &[Vector; 3], &Closest) -> ControlFlow<(), f64>> PlaceVisitor for Search<'_, '_, V> {
     #[inline(always)]
     fn most_sq(&self) -> f32 {
         self.most_sq
@@ -123,12 +140,6 @@ impl PlaceVisitor for Search<'_, '_> {
     }
 
     fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
-        for i in self.view.tree.topology().points_of_leaf(number) {
-            self.compare(i);
-            if self.upper == 0.0 {
-                return ControlFlow::Break(());
-            }
-        }
-        ControlFlow::Continue(())
+        self.view.tree.topology().points_of_leaf(number).try_for_each(|i| self.compare(i))
     }
 }

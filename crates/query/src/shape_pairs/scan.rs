@@ -1,7 +1,10 @@
 //! A placed convex shape and a placed scan.
 
 use crate::ask::answer::Reason;
+use crate::ask::budget::Budget;
 use crate::pair::placed::Placed;
+use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::shapes::penetration;
 use crate::question::Scratch;
 use crate::solid::answer::{ShapeAnswer, ShapeContact, ShapeDistance, ShapeVerdict};
 use crate::solid::contacts::contacts;
@@ -101,6 +104,25 @@ impl<'a> ShapeScanPair<'a> {
         scratch: &mut Scratch,
     ) {
         self.gather(plan, Some(hint), out, scratch);
+    }
+
+    /// Bounds the penetration of the shape: how far it must at least be shifted to touch nothing; see
+    /// [`Target::penetration`](crate::Target::penetration).
+    #[must_use]
+    pub fn penetration(
+        &self,
+        plan: &ShapePlan,
+        interior: Interior,
+        budget: &Budget,
+        scratch: &mut Scratch,
+    ) -> Penetration {
+        let (level, Scratch { contact, solid: own, penetration: memory, .. }) = (scratch.level(), scratch);
+        let working = (level, &mut contact.gathers[0], own);
+        let found = self.ask(plan, |elements, solid| {
+            let elements = elements.without_witness();
+            penetration(&elements, solid, (interior, budget), working, &mut memory.survey)
+        });
+        found.unwrap_or(Penetration::UNKNOWN)
     }
 
     fn gather(

@@ -24,6 +24,7 @@ mod outputs;
 mod penetration;
 mod rays;
 mod scan_penetration;
+mod shape_mesh_penetration;
 mod shape_pairs;
 mod shape_worlds;
 mod shapes;

@@ -26,7 +26,7 @@ fn shifted(pose: &Pose, t: Vector) -> Pose {
 }
 
 /// A closed box with these half edges as a mesh.
-fn box_mesh(half: [f64; 3]) -> MeshHierarchy {
+pub(crate) fn box_mesh(half: [f64; 3]) -> MeshHierarchy {
     let corners = (0..8_u8).map(|n| [0, 1, 2].map(|k| if n >> k & 1 == 1 { half[k] } else { -half[k] }));
     let mut triangles = Vec::new();
     for k in 0..3 {

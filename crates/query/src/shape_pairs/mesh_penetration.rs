@@ -1,0 +1,198 @@
+//! The penetration of a convex shape and a mesh, in the stored frame of the mesh.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::Level;
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::MeshView;
+
+use crate::ask::answer::{Evidence, Statistics};
+use crate::ask::budget::Budget;
+use crate::mesh::foot::{depth_in_solid, foot};
+use crate::mesh::placed::PlacedMesh;
+use crate::mesh::solid::{MeshSolid, SolidView};
+use crate::penetration::answer::Penetration;
+use crate::penetration::apart::out_of_balls;
+use crate::penetration::probe::{Deep, Probe, Vector};
+use crate::penetration::search::search;
+use crate::penetration::survey::ContactSurvey;
+use crate::shape_pairs::mesh_distance::visit_near;
+use crate::solid::core::Solid;
+use crate::solid::overlap::{Overlap, overlap};
+use crate::solid::shape::Shape;
+
+/// A mesh as a, and a shape as b.
+struct ShapeMeshProbe<'s> {
+    mesh: PlacedMesh<'s>,
+    view: &'s MeshView<'s>,
+    parts: &'s MeshSolid,
+    solid: &'s Solid<'s>,
+    budget: Budget,
+    level: Level,
+    spent: Statistics,
+}
+
+/// Bounds the penetration of a mesh with these closed parts and `solid`, which is in the mesh's stored frame.
+pub(crate) fn penetration(
+    mesh: PlacedMesh<'_>,
+    parts: &MeshSolid,
+    solid: &Solid<'_>,
+    (budget, level): (&Budget, Level),
+    survey: &mut ContactSurvey,
+) -> Penetration {
+    if !parts.is_of(mesh.mesh()) {
+        return Penetration::UNKNOWN;
+    }
+    let view = mesh.mesh().arrays();
+    let (budget, spent) = (*budget, Statistics::default());
+    let mut probe = ShapeMeshProbe { mesh, view: &view, parts, solid, budget, level, spent };
+    let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
+    let bounds = search(&mut probe, out, survey);
+    let placed = mesh.stored_to_world();
+    let turned = |way: Vector| placed.rotate(way.into());
+    Penetration::new(&bounds, (placed.scale(), turned), (Evidence::Certified, 0.0), probe.spent)
+}
+
+impl<'s> ShapeMeshProbe<'s> {
+    /// Calls `visit` with the triangles that touch the shape after a shift, until it ends.
+    fn each_touched(
+        &mut self,
+        t: Vector,
+        mut visit: impl FnMut(&mut Self, &[Vector; 3], Vector) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let (solid, mesh) = (self.solid.shifted(&t), self.mesh.mesh());
+        let (view, level) = (self.view, self.level);
+        visit_near(mesh, view, (&solid, 0.0), level, |_, corners, found| {
+            self.spent.leaf_pairs += 1;
+            if found.distance <= solid.radius {
+                visit(self, corners, found.points[1])?;
+            }
+            ControlFlow::Continue(0.0)
+        })
+    }
+
+    /// Returns `true` if a triangle touches the shape after a shift.
+    fn is_touched(&mut self, t: Vector) -> bool {
+        self.each_touched(t, |_, _, _| ControlFlow::Break(())).is_break()
+    }
+
+    /// Bounds the least shift out of a triangle of the shape shifted by `t`.
+    fn out_of(&self, corners: &[Vector; 3], t: Vector) -> Option<Overlap> {
+        let points = corners.map(Into::into);
+        let triangle = Solid::new(&Shape::Triangle { points, radius: 0.0 }, &Pose::IDENTITY)?;
+        Some(overlap(&triangle, &self.solid.shifted(&t)))
+    }
+
+    /// Finds a shift after which the shape touches nothing.
+    fn out_of_balls(&mut self) -> Option<Vector> {
+        let (ball, solid) = (self.view.ball, self.solid);
+        let of_mesh = (Vector::from(ball.centre), ball.radius);
+        let own = (solid.centre, solid.half.norm() + solid.radius);
+        out_of_balls([of_mesh, own], 0.0, |t| !self.is_touched(t))
+    }
+
+    /// Breaks if the budget is spent. Each triangle that is compared counts.
+    fn go_on(&self) -> ControlFlow<()> {
+        self.budget.go_on(self.spent.work())
+    }
+
+    fn in_world(&self, place: Vector) -> Vector {
+        self.mesh.stored_to_world().apply(place.into()).into()
+    }
+
+    fn solid_view(&self) -> SolidView<'s> {
+        SolidView { mesh: self.mesh.mesh(), view: self.view, solid: self.parts, level: self.level }
+    }
+
+    /// Measures how deep a place is in the closed parts of the mesh and in the shape. A place beside the core
+    /// is moved there.
+    fn deep_in_both(&self, place: Vector) -> Option<Deep> {
+        if !self.parts.is_closed() {
+            return None;
+        }
+        let solid = self.solid;
+        let (place, (own, uphill)) = match solid.depth(&place) {
+            Some(own) => (place, own),
+            None => (solid.nearest(&place), (solid.radius, Vector::zeros())),
+        };
+        let placed = self.mesh.stored_to_world();
+        let (depth, away) = depth_in_solid(&self.solid_view(), &self.mesh, self.in_world(place))?;
+        let away = Vector::from(placed.rotate_inverse(away.into()));
+        Some(Deep { place, depth: own + depth / placed.scale(), uphill: uphill + away })
+    }
+
+    /// Measures how deep the place of the mesh that is nearest to another one is in the shape.
+    fn deep_at_surface(&self, place: Vector) -> Option<Deep> {
+        let (mesh, placed) = (self.mesh.mesh(), self.mesh.stored_to_world());
+        let own = self.mesh.pose().apply_inverse(self.in_world(place).into());
+        let on_mesh = self.mesh.pose().apply(foot(mesh, self.view, self.level, own));
+        let place = Vector::from(placed.apply_inverse(on_mesh));
+        let (depth, uphill) = self.solid.depth(&place)?;
+        Some(Deep { place, depth, uphill })
+    }
+}
+
+impl Probe for ShapeMeshProbe<'_> {
+    /// If no triangle touches the shape, it is inside or outside of the closed parts as a whole.
+    fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
+        self.go_on()?;
+        if self.is_touched(t) {
+            return ControlFlow::Continue(false);
+        }
+        let inside = self.in_world(self.solid.inside + t);
+        let is_nested = self.parts.is_closed()
+            && self.solid_view().contains(self.mesh.pose().apply_inverse(inside.into()));
+        ControlFlow::Continue(!is_nested)
+    }
+
+    /// The direction is that in which the shape leaves the triangle there soonest.
+    fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
+        self.go_on()?;
+        let mut met = None;
+        let _first = self.each_touched(t, |probe, corners, place| {
+            met = probe.out_of(corners, t).map(|out| (place, out.way));
+            if met.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        ControlFlow::Continue(met)
+    }
+
+    fn survey(&mut self, survey: &mut ContactSurvey) -> ControlFlow<()> {
+        survey.clear();
+        let zero = Vector::zeros();
+        self.each_touched(zero, |probe, corners, place| {
+            probe.go_on()?;
+            if let Some(out) = probe.out_of(corners, zero) {
+                let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+                survey.add(place, [out.way, normal], out.lower);
+            }
+            ControlFlow::Continue(())
+        })
+    }
+
+    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+        self.go_on()?;
+        self.spent.evaluations += 1;
+        let found = self.deep_in_both(place);
+        // A solid may be too thin for a place inside to be hit.
+        ControlFlow::Continue(found.or_else(|| self.deep_at_surface(place)))
+    }
+
+    fn centres(&self) -> [Vector; 2] {
+        [self.view.tree.root_box().centre.map(f64::from).into(), self.solid.inside]
+    }
+
+    fn axes(&self) -> [[Vector; 3]; 2] {
+        let of_mesh = self.view.tree.root_box().axes;
+        [of_mesh.map(|axis| axis.map(f64::from).into()), self.solid.axes]
+    }
+
+    fn slack(&self) -> f64 {
+        0.0
+    }
+
+    fn rounding(&self) -> f64 {
+        let (ball, solid) = (self.view.ball, self.solid);
+        let of_mesh = Vector::from(ball.centre).amax() + ball.radius;
+        1e-12 * (of_mesh + solid.centre.amax() + solid.half.amax() + solid.radius)
+    }
+}
