@@ -18,7 +18,7 @@ use crate::penetration::search::search;
 use crate::penetration::survey::ContactSurvey;
 use crate::shape_pairs::mesh_distance::visit_near;
 use crate::solid::core::Solid;
-use crate::solid::overlap::{Overlap, overlap};
+use crate::solid::overlap::{Overlap, enough, overlap};
 use crate::solid::shape::Shape;
 
 /// A mesh as a, and a shape as b.
@@ -76,11 +76,17 @@ impl<'s> ShapeMeshProbe<'s> {
         self.each_touched(t, |_, _, _| ControlFlow::Break(())).is_break()
     }
 
-    /// Bounds the least shift out of a triangle of the shape shifted by `t`.
-    fn out_of(&self, corners: &[Vector; 3], t: Vector) -> Option<Overlap> {
+    /// Bounds the least shift out of a triangle of the shape shifted by `t`. `None` if it is at most `least`,
+    /// by the directions of the shape's box.
+    fn out_of(&self, corners: &[Vector; 3], t: Vector, least: f64) -> Option<Overlap> {
         let points = corners.map(Into::into);
         let triangle = Solid::new(&Shape::Triangle { points, radius: 0.0 }, &Pose::IDENTITY)?;
-        Some(overlap(&triangle, &self.solid.shifted(&t)))
+        let shape = self.solid.shifted(&t);
+        let is_less = |axis: &Vector| {
+            enough(&triangle, &shape, axis) <= least || enough(&triangle, &shape, &-axis) <= least
+        };
+        let is_least = shape.axes.iter().any(is_less);
+        (!is_least).then(|| overlap(&triangle, &shape))
     }
 
     /// Finds a shift after which the shape touches nothing.
@@ -150,7 +156,7 @@ impl Probe for ShapeMeshProbe<'_> {
         self.go_on()?;
         let mut met = None;
         let _first = self.each_touched(t, |probe, corners, place| {
-            met = probe.out_of(corners, t).map(|out| (place, out.way));
+            met = probe.out_of(corners, t, f64::NEG_INFINITY).map(|out| (place, out.way));
             if met.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         ControlFlow::Continue(met)
@@ -161,10 +167,10 @@ impl Probe for ShapeMeshProbe<'_> {
         let zero = Vector::zeros();
         self.each_touched(zero, |probe, corners, place| {
             probe.go_on()?;
-            if let Some(out) = probe.out_of(corners, zero) {
-                let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-                survey.add(place, [out.way, normal], out.lower);
-            }
+            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let out = probe.out_of(corners, zero, survey.least);
+            let (way, depth) = out.map_or((zero, 0.0), |out| (out.way, out.lower));
+            survey.add(place, [way, normal], depth);
             ControlFlow::Continue(())
         })
     }

@@ -34,13 +34,12 @@ pub(crate) fn overlap(a: &Solid<'_>, b: &Solid<'_>) -> Overlap {
         let [on_a, on_b] = points(d);
         on_b - on_a
     };
-    let enough = |way: &Vector| radii - way.dot(&support(&-way));
     let apart = closest(|d| points(&-d), a.inside - b.inside, f64::INFINITY);
     let size = a.half.amax() + b.half.amax();
     if apart.distance > 1e-9 * size
         && let Some(way) = (apart.points[1] - apart.points[0]).try_normalize(0.0)
     {
-        let upper = enough(&way);
+        let upper = enough(a, b, &way);
         return Overlap { lower: (radii - apart.distance).min(upper), upper, way };
     }
     let (depth, normal) = inner_depth(support, size);
@@ -49,7 +48,7 @@ pub(crate) fn overlap(a: &Solid<'_>, b: &Solid<'_>) -> Overlap {
     for way in std::iter::once(normal).chain(a.axes).chain(b.axes).chain(edges) {
         let Some(way) = way.try_normalize(1e-9) else { continue };
         for way in [way, -way] {
-            let upper = enough(&way);
+            let upper = enough(a, b, &way);
             if upper < best.upper {
                 (best.upper, best.way) = (upper, way);
             }
@@ -57,6 +56,11 @@ pub(crate) fn overlap(a: &Solid<'_>, b: &Solid<'_>) -> Overlap {
     }
     best.lower = best.lower.min(best.upper);
     best
+}
+
+/// The length of the shift of `b` along a unit vector after which a plane across it separates the shapes.
+pub(crate) fn enough(a: &Solid<'_>, b: &Solid<'_>, way: &Vector) -> f64 {
+    a.radius + b.radius + way.dot(&(a.support(way) - b.support(&-way)))
 }
 
 #[cfg(test)]
