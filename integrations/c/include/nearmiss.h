@@ -282,6 +282,40 @@ typedef int32_t NearmissShapeKind;
 #endif // __cplusplus
 
 /*
+ The scans whose surface encloses a solid. What is inside a solid overlaps it; other scans are surfaces
+ without inside, such as rooms.
+ */
+enum NearmissSolids
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /*
+     None.
+     */
+    NEARMISS_SOLIDS_NONE = 0,
+    /*
+     The first scan, or the only one.
+     */
+    NEARMISS_SOLIDS_A = 1,
+    /*
+     The second scan.
+     */
+    NEARMISS_SOLIDS_B = 2,
+    /*
+     Both scans.
+     */
+    NEARMISS_SOLIDS_BOTH = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum NearmissSolids NearmissSolids;
+#else
+typedef int32_t NearmissSolids;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  The findings of the last question about a pair of scans. Keep one for each pair whose poses
  change little between questions. It never changes a verdict, except one that a budget ends.
  */
@@ -847,6 +881,37 @@ typedef struct NearmissRayHit {
      */
     double normal[3];
 } NearmissRayHit;
+
+/*
+ Bounds on the least shift that separates two things, in world units: lower ≤ length ≤ upper.
+ */
+typedef struct NearmissPenetration {
+    /*
+     A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found.
+     */
+    double lower;
+    /*
+     The length of a shift that separates the two: 0 if they already are separate, infinite if a pose or a
+     shape is out of range.
+     */
+    double upper;
+    /*
+     The unit direction of that shift; 0 if none is needed or known.
+     */
+    double direction[3];
+    /*
+     The length within which nothing is claimed about the scanned things themselves.
+     */
+    double band;
+    /*
+     The certainty of the separation after that shift.
+     */
+    NearmissEvidence evidence;
+    /*
+     True if the budget did not end the search.
+     */
+    bool complete;
+} NearmissPenetration;
 
 /*
  A field of a ROS `PointField`.
@@ -1431,6 +1496,35 @@ NearmissStatus nearmiss_cast_all(const struct NearmissPlan *plan,
                                  struct NearmissRayHit *out,
                                  size_t capacity,
                                  size_t *count);
+
+/*
+ Bounds how far the second scan must be moved, in any direction, to be separate from the first. `solids`
+ is a `NearmissSolids`; the lower bound is 0 if it is `NEARMISS_SOLIDS_NONE`. `limits` may be null. Takes
+ as long as some hundred calls of `nearmiss_collide`. Thread safety: one call at a time for each scratch.
+ */
+NearmissStatus nearmiss_penetration(const struct NearmissPlan *plan,
+                                    const struct NearmissPlaced *a,
+                                    const struct NearmissPlaced *b,
+                                    int32_t solids,
+                                    const struct NearmissBudget *limits,
+                                    struct NearmissScratch *scratch,
+                                    struct NearmissPenetration *out);
+
+/*
+ Bounds how far a shape must be moved, in any direction, to touch nothing of a scan. `solids` is
+ `NEARMISS_SOLIDS_A` if the surface of the scan encloses a solid. `limits` may be null. Takes as long as
+ some hundred calls of `nearmiss_touch`. Thread safety: one call at a time for each scratch.
+
+ # Safety
+ Pointers are null or valid, that to the points of a hull too.
+ */
+NearmissStatus nearmiss_shape_penetration(const struct NearmissPlan *plan,
+                                          const struct NearmissPlaced *scan,
+                                          const struct NearmissShape *shape,
+                                          int32_t solids,
+                                          const struct NearmissBudget *limits,
+                                          struct NearmissScratch *scratch,
+                                          struct NearmissPenetration *out);
 
 /*
  Prepares the points of a ROS `PointCloud2`, with its normals if it has any. Points that are not finite

@@ -16,7 +16,7 @@ use crate::status::{Failure, Status, guard};
 
 /// Returns the pair of two placed scans.
 #[inline(always)]
-fn pair<'a>(
+pub(crate) fn pair<'a>(
     a: Option<&Placed<'a>>,
     b: Option<&Placed<'a>>,
     limits: Option<&Budget>,

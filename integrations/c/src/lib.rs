@@ -22,6 +22,8 @@ pub mod collide;
 pub mod shape;
 pub mod target;
 
+pub mod penetration;
+
 pub mod cloud;
 pub mod motion;
 pub mod slices;

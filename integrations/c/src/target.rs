@@ -187,7 +187,7 @@ impl Ray {
 }
 
 /// Returns a target.
-fn target<'a>(plan: Option<&Plan>, scan: Option<&Placed<'a>>) -> Result<Target<'a>, Failure> {
+pub(crate) fn target<'a>(plan: Option<&Plan>, scan: Option<&Placed<'a>>) -> Result<Target<'a>, Failure> {
     Ok(Target::new(required(scan, "scan")?.at()?, &get(plan, "plan")?.shape))
 }
 

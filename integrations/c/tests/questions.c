@@ -58,8 +58,23 @@ static void pairs(void) {
     OK(nearmiss_distance(plan, &low, &high, NULL, scratch, &distance));
     CHECK(distance.lower <= 0.3 && fabs(distance.upper - 0.3) < 1e-6 && distance.complete);
 
+    NearmissPenetration out;
+    OK(nearmiss_penetration(plan, &low, &high, NEARMISS_SOLIDS_NONE, NULL, scratch, &out));
+    CHECK(out.lower == 0.0 && out.upper == 0.0 && out.complete);
+    OK(nearmiss_penetration(plan, &low, &cross, NEARMISS_SOLIDS_NONE, NULL, scratch, &out));
+    CHECK(out.lower >= 0.0 && out.lower <= out.upper && out.upper > 0.0 && isfinite(out.upper));
+    NearmissPlaced moved = cross;
+    for (int k = 0; k < 3; k++) {
+        moved.pose.translation[k] += 1.001 * out.upper * out.direction[k];
+    }
+    OK(nearmiss_collide(plan, &low, &moved, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED);
+    CHECK(nearmiss_penetration(plan, &low, &high, 4, NULL, scratch, &out) == NEARMISS_STATUS_ARGUMENT);
+
     NearmissBudget budget = nearmiss_unlimited();
     budget.work = 1;
+    OK(nearmiss_penetration(plan, &low, &cross, NEARMISS_SOLIDS_NONE, &budget, scratch, &out));
+    CHECK(!out.complete && isfinite(out.upper));
     OK(nearmiss_collide(plan, &low, &cross, &budget, NULL, scratch, &answer));
     CHECK(answer.verdict == NEARMISS_VERDICT_UNDECIDED && answer.reason == NEARMISS_REASON_BUDGET);
     CHECK(answer.likelihood >= 0.0 && answer.likelihood <= 1.0);
@@ -91,6 +106,13 @@ static void shapes(void) {
     }
     OK(nearmiss_shape_distance(plan, &floor, all, 1, 0.01, scratch, distances));
     CHECK(isinf(distances[0].upper) && distances[0].source == UINT32_MAX);
+
+    const double sunk[3] = {0.5, 0.5, 0.05};
+    NearmissShape ball = nearmiss_sphere(&sunk, 0.1);
+    NearmissPenetration out;
+    OK(nearmiss_shape_penetration(plan, &floor, &ball, NEARMISS_SOLIDS_NONE, NULL, scratch, &out));
+    CHECK(out.lower <= 0.05 + 1e-9 && out.lower > 0.04 && fabs(out.upper - 0.05) < 2e-3 && out.direction[2] > 0.99);
+    CHECK(nearmiss_shape_penetration(plan, &floor, &ball, 2, NULL, scratch, &out) == NEARMISS_STATUS_ARGUMENT);
 
     NearmissShapeHint *hint;
     OK(nearmiss_shape_hint_new(&hint));

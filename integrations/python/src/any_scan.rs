@@ -1,7 +1,7 @@
 //! Methods of `AnyScan`: the questions about scans, still or moving.
 
 use nearmiss::{
-    ClashOptions, ClashPlan, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, Interior, MeshScanPair,
+    ClashOptions, ClashPlan, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, MeshScanPair,
     MeshScanPlan, Pose, Prepared as _,
 };
 use pyo3::exceptions::PyRuntimeWarning;
@@ -14,12 +14,12 @@ use crate::failure::refused;
 use crate::frame::Frame;
 use crate::hint::Hint;
 use crate::options::{OF_MEANING, OF_SCANS, OF_SHAPES, Options};
-use crate::pair::{Apart, Contact, Question, pair_of};
+use crate::pair::{Apart, Contact, Overlap, Question, pair_of};
 use crate::pool::ask;
 use crate::poses::{Poses, both};
 use crate::record::array;
 use crate::target::Target;
-use crate::things::{AnyScan, Side, Thing};
+use crate::things::{AnyScan, Mesh, Side, Thing};
 
 impl AnyScan {
     /// Prepares a question about this scan and another thing.
@@ -215,7 +215,7 @@ impl AnyScan {
                     pair.contacts(&mut found).collide(&plan, scratch)
                 });
             }
-            Side::Mesh(mesh) => {
+            Side::Mesh(Mesh { mesh, .. }) => {
                 let plan = MeshScanPlan::new(&options.collide, &scan).map_err(refused)?;
                 let [at, of_mesh] = both([&*scan, mesh], [own_pose, pose])?;
                 ask(py, |scratch| {
@@ -260,40 +260,24 @@ impl AnyScan {
     }
 
     /// Bound the length of the shortest move that takes `other`, at `pose`, out of this scan, at
-    /// `own_pose`. `solid` names the scans whose surface encloses a solid: "a" for this scan, "b" for
-    /// `other`, or "both".
+    /// `own_pose`. `other` is any scan or a Mesh. `solid` names the scans whose surface encloses a solid:
+    /// "a" for this scan, "b" for `other`, or "both". Closed parts of a mesh are solid anyway.
     ///
     /// Returns (lower, upper, direction): `other` is free if it moves by `upper` along the direction,
-    /// and no move shorter than `lower` frees it. Both are 0 for separate scans; `lower` is 0 without a
-    /// solid scan. Options are those of `collide`.
+    /// and no move shorter than `lower` frees it. Both are 0 for separate things; `lower` is 0 if neither is
+    /// solid. Options are those of `collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
     fn penetration(
         &self,
-        other: &Bound<'_, Self>,
+        py: Python<'_>,
+        other: Thing<'_>,
         pose: Option<&Bound<'_, PyAny>>,
         own_pose: Option<&Bound<'_, PyAny>>,
         solid: Option<&str>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<(f64, f64, [f64; 3])> {
-        let interiors = match solid {
-            None => [Interior::Hollow, Interior::Hollow],
-            Some("a") => [Interior::Solid, Interior::Hollow],
-            Some("b") => [Interior::Hollow, Interior::Solid],
-            Some("both") => [Interior::Solid, Interior::Solid],
-            Some(name) => {
-                return Err(refused(format!(
-                    "expected `solid` to be \"a\", \"b\" or \"both\", got {name:?}"
-                )));
-            }
-        };
-        let (py, scans) = (other.py(), self.scans(other));
-        let options = Options::new(options, OF_SCANS, scans[0].metric())?;
-        let plan = CollidePlan::new(&options.collide, &scans[0], &scans[1]).map_err(refused)?;
-        let poses = poses_of(&scans, [own_pose, pose])?;
-        let found = ask(py, |scratch| {
-            pair_of(&scans, &poses).within(&options.budget()).penetration(&plan, interiors, scratch)
-        });
-        Ok((found.lower, found.upper, found.direction))
+        let sides = [Side::Scan(self.0.frame(py)), other.side()];
+        Overlap::new(sides, solid, options)?.one(py, [own_pose, pose])
     }
 
     /// List the places where this scan, at `own_pose`, touches `other`, at `pose`, or comes nearer than

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use nearmiss::geometry::TriangleMesh;
 use nearmiss::mesh::CleanOptions;
 use nearmiss::store::Progress;
-use nearmiss::{Mesh as Prepared, MeshBuildOptions, MeshSolid, Metric};
+use nearmiss::{Mesh as Prepared, MeshBuildOptions};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
@@ -14,8 +14,7 @@ use crate::answers::{Answer, Distance, MeshContactRecord};
 use crate::arrays::{Points, corners};
 use crate::cloud::rows;
 use crate::failure::{refused, unloadable, unreadable, unwritable};
-use crate::options::{OF_BUDGET, Options};
-use crate::pair::{Apart, Contact, Question, mesh_pair_of};
+use crate::pair::{Apart, Contact, Overlap, Question, mesh_pair_of};
 use crate::pool::ask;
 use crate::poses::both;
 use crate::prepare::watched;
@@ -40,11 +39,7 @@ impl Mesh {
         other: &'a Thing<'_>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Q> {
-        Q::new([Side::Mesh(&self.mesh), other.side()], options)
-    }
-
-    fn solid(&self) -> &MeshSolid {
-        self.solid.get_or_init(|| MeshSolid::new(&self.mesh))
+        Q::new([Side::Mesh(self), other.side()], options)
     }
 }
 
@@ -204,26 +199,22 @@ impl Mesh {
     }
 
     /// Bound the length of the shortest move that takes `other`, at `pose`, out of this mesh, at
-    /// `own_pose`. Closed parts are solid.
+    /// `own_pose`. `other` is a Mesh or any scan. Closed parts of meshes are solid; `solid="b"` tells that
+    /// the surface of a scan encloses a solid.
     ///
     /// Returns (lower, upper, direction): `other` is free if it moves by `upper` along the direction,
-    /// and no move shorter than `lower` frees it. Both are 0 for separate meshes.
-    #[pyo3(signature = (other, pose = None, own_pose = None, **options))]
+    /// and no move shorter than `lower` frees it. Both are 0 for separate things. Options are `work` and
+    /// `seconds`; for a scan those of `Scan.collide`.
+    #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
     fn penetration(
         &self,
-        other: &Bound<'_, Self>,
+        py: Python<'_>,
+        other: Thing<'_>,
         pose: Option<&Bound<'_, PyAny>>,
         own_pose: Option<&Bound<'_, PyAny>>,
+        solid: Option<&str>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<(f64, f64, [f64; 3])> {
-        let (py, other) = (other.py(), other.get());
-        let options = Options::new(options, OF_BUDGET, Metric::Euclidean)?;
-        let meshes = [&self.mesh, &other.mesh];
-        let poses = both(meshes.map(|mesh| mesh as _), [own_pose, pose])?;
-        let found = ask(py, |scratch| {
-            let pair = mesh_pair_of(&meshes, &poses).within(&options.budget());
-            pair.penetration([self.solid(), other.solid()], scratch.meshes())
-        });
-        Ok((found.lower, found.upper, found.direction))
+        Overlap::new([Side::Mesh(self), other.side()], solid, options)?.one(py, [own_pose, pose])
     }
 }

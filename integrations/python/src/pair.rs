@@ -1,8 +1,8 @@
 //! Questions about two things: two scans, two meshes, or a scan and a mesh.
 
 use nearmiss::{
-    CollidePlan, DistanceOptions, DistancePlan, Mesh, MeshPair, MeshScanPair, MeshScanPlan, Metric, Pair,
-    PairHint, PlanError, PointHierarchy, Pose, Prepared as _, Scratch,
+    CollidePlan, DistanceOptions, DistancePlan, Interior, Mesh, MeshPair, MeshScanPair, MeshScanPlan,
+    MeshSolid, Metric, Pair, PairHint, PlanError, PointHierarchy, Pose, Prepared as _, Scratch,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -85,9 +85,9 @@ impl<'a, S, M> Planned<'a, S, M> {
         };
         let planned = match sides {
             [Side::Scan(a), Side::Scan(b)] => scans(&a, &b).map(|plan| Self::Scans([a, b], plan)),
-            [Side::Mesh(a), Side::Mesh(b)] => Ok(Self::Meshes([a, b])),
-            [Side::Scan(scan), Side::Mesh(mesh)] => mixed(scan, mesh, false),
-            [Side::Mesh(mesh), Side::Scan(scan)] => mixed(scan, mesh, true),
+            [Side::Mesh(a), Side::Mesh(b)] => Ok(Self::Meshes([&a.mesh, &b.mesh])),
+            [Side::Scan(scan), Side::Mesh(mesh)] => mixed(scan, &mesh.mesh, false),
+            [Side::Mesh(mesh), Side::Scan(scan)] => mixed(scan, &mesh.mesh, true),
         };
         planned.map_err(refused)
     }
@@ -213,6 +213,82 @@ impl<'a> Question<'a> for Apart<'a> {
                 mixed.in_order(DistanceRecord::new(&distance))
             }
         }
+    }
+}
+
+/// The question how far to move the second of two things out of the first.
+pub(crate) struct Overlap<'a> {
+    pair: Planned<'a, CollidePlan, MeshScanPlan>,
+    /// Those of scans.
+    interiors: [Interior; 2],
+    /// Those of meshes.
+    solids: [Option<&'a MeshSolid>; 2],
+    options: Options,
+}
+
+impl<'a> Overlap<'a> {
+    /// Validates the options. `solid` names scans whose surface encloses a solid.
+    pub(crate) fn new(
+        sides: [Side<'a>; 2],
+        solid: Option<&str>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let options = options_of(options, &sides, [OF_SCANS, OF_BUDGET])?;
+        let solids = sides.each_ref().map(|side| match side {
+            Side::Mesh(mesh) => Some(mesh.solid()),
+            Side::Scan(_) => None,
+        });
+        let are_solid = match solid {
+            None => [false, false],
+            Some("a") => [true, false],
+            Some("b") => [false, true],
+            Some("both") => [true, true],
+            Some(name) => {
+                return Err(refused(format!(
+                    "expected `solid` to be \"a\", \"b\" or \"both\", got {name:?}"
+                )));
+            }
+        };
+        if let Some(name) = solid.filter(|_| (0..2).any(|k| are_solid[k] && solids[k].is_some())) {
+            return Err(refused(format!(
+                "expected `solid` to name scans, got {name:?} with a mesh; its closed parts are solid anyway"
+            )));
+        }
+        let asked = &options.collide;
+        let scans = |a: &_, b: &_| CollidePlan::new(asked, a, b);
+        let pair = Planned::new(sides, scans, |scan| MeshScanPlan::new(asked, scan))?;
+        let interiors = are_solid.map(|is| if is { Interior::Solid } else { Interior::Hollow });
+        Ok(Self { pair, interiors, solids, options })
+    }
+
+    /// Returns both bounds, and the direction in which to move the second thing.
+    pub(crate) fn one(
+        &self,
+        py: Python<'_>,
+        poses: [Option<&Bound<'_, PyAny>>; 2],
+    ) -> PyResult<(f64, f64, [f64; 3])> {
+        let poses = both(self.pair.things(), poses)?;
+        let budget = self.options.budget();
+        let found = ask(py, |scratch| match (&self.pair, self.solids) {
+            (Planned::Scans(scans, plan), _) => {
+                Some(pair_of(scans, &poses).within(&budget).penetration(plan, self.interiors, scratch))
+            }
+            (Planned::Meshes(meshes), [Some(a), Some(b)]) => {
+                Some(mesh_pair_of(meshes, &poses).within(&budget).penetration([a, b], scratch.meshes()))
+            }
+            (Planned::Mixed(mixed, plan), [Some(solid), _] | [_, Some(solid)]) => {
+                let inside = (self.interiors[usize::from(mixed.is_swapped)], solid);
+                let mut found = mixed.pair(&poses).within(&budget).penetration(plan, inside, scratch);
+                if mixed.is_swapped {
+                    // The mesh moves out of the scan.
+                    found.direction = found.direction.map(|c| -c);
+                }
+                Some(found)
+            }
+            _ => None,
+        });
+        let Some(found) = found else { return Err(refused("expected the closed parts of a mesh")) };
+        Ok((found.lower, found.upper, found.direction))
     }
 }
 

@@ -55,13 +55,20 @@ impl Thing<'_> {
     pub(crate) fn side(&self) -> Side<'_> {
         match self {
             Self::Scan(scan) => Side::Scan(scan.get().0.frame(scan.py())),
-            Self::Mesh(mesh) => Side::Mesh(&mesh.get().mesh),
+            Self::Mesh(mesh) => Side::Mesh(mesh.get()),
         }
+    }
+}
+
+impl Mesh {
+    /// Returns the closed parts, found when first asked for.
+    pub(crate) fn solid(&self) -> &MeshSolid {
+        self.solid.get_or_init(|| MeshSolid::new(&self.mesh))
     }
 }
 
 /// One of the two sides of a question.
 pub(crate) enum Side<'a> {
     Scan(Frame<'a>),
-    Mesh(&'a PreparedMesh),
+    Mesh(&'a Mesh),
 }

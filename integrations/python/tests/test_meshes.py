@@ -67,6 +67,22 @@ class Meshes(unittest.TestCase):
         verdicts = mesh.collide_each(scan, poses(5, 50, 0.1))["verdict"]
         self.assertEqual(set(verdicts.tolist()), {0, 1})
 
+    def test_a_mesh_and_a_scan_move_out_of_each_other(self):
+        mesh, scan, near = nearmiss.Mesh.read(DRAGON), dragon(), np.array([0.09, 0.03, 0.01])
+        _, exact, _ = mesh.penetration(mesh, at(*near))
+        for a, b, solid, wrong in ((scan, mesh, "a", "b"), (mesh, scan, "b", "both")):
+            lower, upper, way = a.penetration(b, at(*near), solid=solid)
+            self.assertTrue(0.0 <= lower <= upper, (lower, upper))
+            self.assertLess(abs(upper - exact), 2.0 * scan.sampling_radius)
+            free = at(*(near + 1.001 * upper * np.array(way)))
+            self.assertEqual(a.penetration(b, free, solid=solid)[1], 0.0)
+            with self.assertRaisesRegex(ValueError, "to name scans"):
+                a.penetration(b, solid=wrong)
+        with self.assertRaisesRegex(ValueError, "to name scans"):
+            mesh.penetration(mesh, solid="a")
+        with self.assertRaisesRegex(TypeError, "options among work"):
+            mesh.penetration(mesh, margin=0.1)
+
     def test_files_and_pickles_hold_the_same_mesh(self):
         mesh = nearmiss.Mesh.read(DRAGON)
         with tempfile.TemporaryDirectory() as folder:

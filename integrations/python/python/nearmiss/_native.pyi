@@ -256,7 +256,7 @@ class AnyScan:
     ) -> _Records: ...
     def penetration(
         self,
-        other: AnyScan,
+        other: AnyScan | Mesh,
         pose: _Pose = None,
         own_pose: _Pose = None,
         *,
@@ -386,7 +386,13 @@ class Mesh:
     ) -> _Records: ...
     def contacts(self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None) -> _Records: ...
     def penetration(
-        self, other: Mesh, pose: _Pose = None, own_pose: _Pose = None, **options: Unpack[_BudgetOptions]
+        self,
+        other: AnyScan | Mesh,
+        pose: _Pose = None,
+        own_pose: _Pose = None,
+        *,
+        solid: str | None = None,
+        **options: Unpack[_CollideOptions],
     ) -> tuple[float, float, _Triple]: ...
 
 class Shape:
