@@ -52,7 +52,8 @@ pub struct Penetration {
 
 impl Penetration {
     fn new(found: &nearmiss::Penetration) -> Self {
-        let &nearmiss::Penetration { lower, upper, direction, evidence: certainty, band, complete, .. } = found;
+        let &nearmiss::Penetration { lower, upper, direction, evidence: certainty, band, complete, .. } =
+            found;
         Self { lower, upper, direction, band, evidence: evidence(certainty), complete }
     }
 }

@@ -267,6 +267,7 @@ impl AnyScan {
     /// and no move shorter than `lower` frees it. Both are 0 for separate things; `lower` is 0 if neither is
     /// solid. Options are those of `collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
+    #[expect(clippy::too_many_arguments, reason = "names in Python")]
     fn penetration(
         &self,
         py: Python<'_>,

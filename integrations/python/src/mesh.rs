@@ -206,6 +206,7 @@ impl Mesh {
     /// and no move shorter than `lower` frees it. Both are 0 for separate things. Options are `work` and
     /// `seconds`; for a scan those of `Scan.collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
+    #[expect(clippy::too_many_arguments, reason = "names in Python")]
     fn penetration(
         &self,
         py: Python<'_>,

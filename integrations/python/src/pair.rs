@@ -219,9 +219,9 @@ impl<'a> Question<'a> for Apart<'a> {
 /// The question how far to move the second of two things out of the first.
 pub(crate) struct Overlap<'a> {
     pair: Planned<'a, CollidePlan, MeshScanPlan>,
-    /// Those of scans.
+    /// The insides of scans.
     interiors: [Interior; 2],
-    /// Those of meshes.
+    /// The closed parts of meshes.
     solids: [Option<&'a MeshSolid>; 2],
     options: Options,
 }

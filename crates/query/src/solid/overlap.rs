@@ -1,4 +1,4 @@
-//! How far to shift one of two convex shapes so that they only touch.
+//! The least shift of one of two convex shapes after which they only touch.
 
 use nearmiss_geometry::nalgebra::Vector3;
 

@@ -96,7 +96,11 @@ mod tests {
                 assert_eq!(found.is_some(), distance <= within, "{shape:?} {disc:?} {within}");
                 // Between the bounds of a search, neither is proven.
                 if (distance - within).abs() > 1e-7 {
-                    assert_eq!(solid.is_beyond(&disc, within), found.is_none(), "{shape:?} {disc:?} {within}");
+                    assert_eq!(
+                        solid.is_beyond(&disc, within),
+                        found.is_none(),
+                        "{shape:?} {disc:?} {within}"
+                    );
                 }
                 let Some(point) = found else {
                     far += 1;

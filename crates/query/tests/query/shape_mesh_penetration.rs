@@ -4,8 +4,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Pose, TriangleMesh};
 use nearmiss_hierarchy::{MeshBuildOptions, MeshHierarchy};
 use nearmiss_query::{
-    AsShape, Budget, Evidence, MeshPair, MeshScratch, MeshSolid, Penetration, PlacedMesh, Scratch, Shape, ShapeMeshPair,
-    ShapePair,
+    AsShape, Budget, Evidence, MeshPair, MeshScratch, MeshSolid, Penetration, PlacedMesh, Scratch, Shape,
+    ShapeMeshPair, ShapePair,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use rand::RngExt;
@@ -49,7 +49,10 @@ fn boxes_penetrate_alike_as_shapes_and_meshes() {
         assert!(exact.upper - exact.lower <= off, "{exact:?}");
         assert!(found.complete && found.evidence == Evidence::Certified);
         for found in [&found, &twin] {
-            assert!(found.lower <= exact.upper + off && found.upper >= exact.lower - off, "{exact:?} {found:?}");
+            assert!(
+                found.lower <= exact.upper + off && found.upper >= exact.lower - off,
+                "{exact:?} {found:?}"
+            );
         }
         if exact.upper <= off {
             assert!(found.upper <= 2.0 * off, "{exact:?} {found:?}");
@@ -141,7 +144,7 @@ fn shapes_inside_closed_meshes() {
     }
 }
 
-/// What is not a pair has no known penetration.
+/// An invalid shape, pose or solid gives no known penetration.
 #[test]
 fn invalid_pairs_have_no_penetration() {
     let (mesh, other) = (box_mesh([1.0; 3]), box_mesh([2.0; 3]));
