@@ -892,7 +892,7 @@ typedef struct NearmissPenetration {
     double lower;
     /*
      The length of a shift that separates the two: 0 if they already are separate, infinite if a pose or a
-     shape is out of range.
+     shape is out of range or if no such shift was found.
      */
     double upper;
     /*
@@ -1499,7 +1499,7 @@ NearmissStatus nearmiss_cast_all(const struct NearmissPlan *plan,
 
 /*
  Bounds how far the second scan must be moved, in any direction, to be separate from the first. `solids`
- is a `NearmissSolids`; the lower bound is 0 if it is `NEARMISS_SOLIDS_NONE`. `limits` may be null. Takes
+ is a `NearmissSolids`. Without solids and thickened points, the lower bound is 0. `limits` may be null. Takes
  as long as some hundred calls of `nearmiss_collide`. Thread safety: one call at a time for each scratch.
  */
 NearmissStatus nearmiss_penetration(const struct NearmissPlan *plan,

@@ -38,7 +38,7 @@ pub struct Penetration {
     /// A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found.
     pub lower: f64,
     /// The length of a shift that separates the two: 0 if they already are separate, infinite if a pose or a
-    /// shape is out of range.
+    /// shape is out of range or if no such shift was found.
     pub upper: f64,
     /// The unit direction of that shift; 0 if none is needed or known.
     pub direction: [f64; 3],
@@ -68,7 +68,7 @@ fn interiors(solids: i32, last: Solids) -> Result<[Interior; 2], Failure> {
 }
 
 /// Bounds how far the second scan must be moved, in any direction, to be separate from the first. `solids`
-/// is a `NearmissSolids`; the lower bound is 0 if it is `NEARMISS_SOLIDS_NONE`. `limits` may be null. Takes
+/// is a `NearmissSolids`. Without solids and thickened points, the lower bound is 0. `limits` may be null. Takes
 /// as long as some hundred calls of `nearmiss_collide`. Thread safety: one call at a time for each scratch.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_penetration(

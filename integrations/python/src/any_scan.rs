@@ -265,7 +265,7 @@ impl AnyScan {
     ///
     /// Returns (lower, upper, direction): `other` is free if it moves by `upper` along the direction,
     /// and no move shorter than `lower` frees it. Both are 0 for separate things; `lower` is 0 if neither is
-    /// solid. Options are those of `collide`.
+    /// solid and no points are thickened. Options are those of `collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
     #[expect(clippy::too_many_arguments, reason = "names in Python")]
     fn penetration(

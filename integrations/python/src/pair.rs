@@ -1,8 +1,8 @@
 //! Questions about two things: two scans, two meshes, or a scan and a mesh.
 
 use nearmiss::{
-    CollidePlan, DistanceOptions, DistancePlan, Interior, Mesh, MeshPair, MeshScanPair, MeshScanPlan,
-    MeshSolid, Metric, Pair, PairHint, PlanError, PointHierarchy, Pose, Prepared as _, Scratch,
+    CollidePlan, DistanceOptions, DistancePlan, Interior, Mesh, MeshPair, MeshScanPair, MeshScanPlan, Metric,
+    Pair, PairHint, PlanError, PointHierarchy, Pose, Prepared as _, Scratch,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -14,7 +14,7 @@ use crate::frame::Frame;
 use crate::options::{OF_BUDGET, OF_DISTANCE, OF_MESHES, OF_SCANS, Options};
 use crate::pool::ask;
 use crate::poses::{Placeable, both};
-use crate::things::Side;
+use crate::things::{Mesh as Closable, Side};
 
 /// A question about two things, with its options.
 pub(crate) trait Question<'a>: Sized + Sync {
@@ -221,8 +221,7 @@ pub(crate) struct Overlap<'a> {
     pair: Planned<'a, CollidePlan, MeshScanPlan>,
     /// The insides of scans.
     interiors: [Interior; 2],
-    /// The closed parts of meshes.
-    solids: [Option<&'a MeshSolid>; 2],
+    meshes: [Option<&'a Closable>; 2],
     options: Options,
 }
 
@@ -234,8 +233,8 @@ impl<'a> Overlap<'a> {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let options = options_of(options, &sides, [OF_SCANS, OF_BUDGET])?;
-        let solids = sides.each_ref().map(|side| match side {
-            Side::Mesh(mesh) => Some(mesh.solid()),
+        let meshes = sides.each_ref().map(|side| match side {
+            Side::Mesh(mesh) => Some(*mesh),
             Side::Scan(_) => None,
         });
         let are_solid = match solid {
@@ -249,7 +248,7 @@ impl<'a> Overlap<'a> {
                 )));
             }
         };
-        if let Some(name) = solid.filter(|_| (0..2).any(|k| are_solid[k] && solids[k].is_some())) {
+        if let Some(name) = solid.filter(|_| (0..2).any(|k| are_solid[k] && meshes[k].is_some())) {
             return Err(refused(format!(
                 "expected `solid` to name scans, got {name:?} with a mesh; its closed parts are solid anyway"
             )));
@@ -258,7 +257,7 @@ impl<'a> Overlap<'a> {
         let scans = |a: &_, b: &_| CollidePlan::new(asked, a, b);
         let pair = Planned::new(sides, scans, |scan| MeshScanPlan::new(asked, scan))?;
         let interiors = are_solid.map(|is| if is { Interior::Solid } else { Interior::Hollow });
-        Ok(Self { pair, interiors, solids, options })
+        Ok(Self { pair, interiors, meshes, options })
     }
 
     /// Returns both bounds, and the direction in which to move the second thing.
@@ -269,15 +268,18 @@ impl<'a> Overlap<'a> {
     ) -> PyResult<(f64, f64, [f64; 3])> {
         let poses = both(self.pair.things(), poses)?;
         let budget = self.options.budget();
-        let found = ask(py, |scratch| match (&self.pair, self.solids) {
+        // The closed parts are found when first asked for, without the interpreter.
+        let found = ask(py, |scratch| match (&self.pair, self.meshes) {
             (Planned::Scans(scans, plan), _) => {
                 Some(pair_of(scans, &poses).within(&budget).penetration(plan, self.interiors, scratch))
             }
-            (Planned::Meshes(meshes), [Some(a), Some(b)]) => {
-                Some(mesh_pair_of(meshes, &poses).within(&budget).penetration([a, b], scratch.meshes()))
-            }
-            (Planned::Mixed(mixed, plan), [Some(solid), _] | [_, Some(solid)]) => {
-                let inside = (self.interiors[usize::from(mixed.is_swapped)], solid);
+            (Planned::Meshes(meshes), [Some(a), Some(b)]) => Some(
+                mesh_pair_of(meshes, &poses)
+                    .within(&budget)
+                    .penetration([a.solid(), b.solid()], scratch.meshes()),
+            ),
+            (Planned::Mixed(mixed, plan), [Some(mesh), _] | [_, Some(mesh)]) => {
+                let inside = (self.interiors[usize::from(mixed.is_swapped)], mesh.solid());
                 let mut found = mixed.pair(&poses).within(&budget).penetration(plan, inside, scratch);
                 if mixed.is_swapped {
                     // The mesh moves out of the scan.

@@ -78,7 +78,7 @@ impl<'a> ShapeMeshPair<'a> {
 
     /// Bounds the penetration of the mesh and the shape: how far the shape must at least be shifted, in any
     /// direction, to be separate from the mesh. `parts` tells which parts of the mesh are closed. Unlike for
-    /// [`Self::distance`], these are solid.
+    /// [`Self::distance`], these are solid. The upper bound is infinite if `parts` are those of another mesh.
     ///
     /// Both bounds are valid whenever the budget ends the search. The upper one comes from a shift that was
     /// tested, and is a local minimum: a shorter shift may exist in a direction that was not tried. The lower

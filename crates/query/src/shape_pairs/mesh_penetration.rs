@@ -54,7 +54,8 @@ pub(crate) fn penetration(
 }
 
 impl<'s> ShapeMeshProbe<'s> {
-    /// Calls `visit` with the triangles that touch the shape after a shift, until it ends.
+    /// Calls `visit` with the triangles that touch the shape after a shift, until it ends. The shift and each
+    /// triangle that is compared count as evaluations.
     fn each_touched(
         &mut self,
         t: Vector,
@@ -62,9 +63,12 @@ impl<'s> ShapeMeshProbe<'s> {
     ) -> ControlFlow<()> {
         let (solid, mesh) = (self.solid.shifted(&t), self.mesh.mesh());
         let (view, level) = (self.view, self.level);
+        self.spent.evaluations += 1;
         visit_near(mesh, view, (&solid, 0.0), level, |_, corners, found| {
-            self.spent.leaf_pairs += 1;
-            if found.distance <= solid.radius {
+            self.spent.evaluations += 1;
+            // NaN and distances that are not proven count as touching.
+            let is_apart = found.lower > solid.radius;
+            if !is_apart {
                 visit(self, corners, found.points[1])?;
             }
             ControlFlow::Continue(0.0)
@@ -97,7 +101,7 @@ impl<'s> ShapeMeshProbe<'s> {
         out_of_balls([of_mesh, own], 0.0, |t| !self.is_touched(t))
     }
 
-    /// Breaks if the budget is spent. Each triangle that is compared counts.
+    /// Breaks if the budget is spent.
     fn go_on(&self) -> ControlFlow<()> {
         self.budget.go_on(self.spent.work())
     }
@@ -168,6 +172,7 @@ impl Probe for ShapeMeshProbe<'_> {
         self.each_touched(zero, |probe, corners, place| {
             probe.go_on()?;
             let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let normal = normal.try_normalize(0.0).unwrap_or(zero);
             let out = probe.out_of(corners, zero, survey.least);
             let (way, depth) = out.map_or((zero, 0.0), |out| (out.way, out.lower));
             survey.add(place, [way, normal], depth);
@@ -196,9 +201,14 @@ impl Probe for ShapeMeshProbe<'_> {
         0.0
     }
 
+    /// Places go through the world and the frame of the mesh's input to its closed parts and back.
     fn rounding(&self) -> f64 {
         let (ball, solid) = (self.view.ball, self.solid);
         let of_mesh = Vector::from(ball.centre).amax() + ball.radius;
-        1e-12 * (of_mesh + solid.centre.amax() + solid.half.amax() + solid.radius)
+        let stored = of_mesh + solid.centre.amax() + solid.half.amax() + solid.radius;
+        let (frame, placed, pose) = (self.mesh.mesh().frame(), self.mesh.stored_to_world(), self.mesh.pose());
+        let far = |pose: &Pose| Vector::from(pose.translation()).amax() / placed.scale();
+        let input = Vector::from(frame.origin).amax() / frame.scale;
+        1e-12 * stored + 1e-14 * (input + far(placed) + far(pose))
     }
 }

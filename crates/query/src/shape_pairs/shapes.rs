@@ -8,7 +8,7 @@ use crate::penetration::answer::Penetration;
 use crate::penetration::search::Bounds;
 use crate::solid::between::{ShapeGap, gap};
 use crate::solid::core::Solid;
-use crate::solid::overlap::overlap;
+use crate::solid::overlap::{Overlap, overlap};
 use crate::solid::placed::PlacedShape;
 
 /// Two placed convex shapes, such as two links of a robot.
@@ -55,11 +55,11 @@ impl<'a> ShapePair<'a> {
 
     /// Bounds the penetration of the shapes: how far b must at least be shifted to be separate from a.
     ///
-    /// The bounds agree to a few percent: exactly if only the roundings overlap, and to a millionth of the
-    /// size for boxes and hulls. Needs no budget.
+    /// The bounds agree to about 1e-8 of the size if only the roundings overlap, to 1e-5 for boxes, and to a
+    /// few percent for most round cores. Needs no budget.
     ///
     /// Grows a polytope inside the set of all differences of points of both cores (van den Bergen 2001).
-    /// Costs up to 50 µs. Does not allocate.
+    /// Takes up to 64 points of it, so some tens of microseconds for hulls of a few points. Does not allocate.
     ///
     /// ```
     /// use nearmiss_geometry::Pose;
@@ -77,7 +77,7 @@ impl<'a> ShapePair<'a> {
             let mut bounds = Bounds { lower: 0.0, shift: Vector3::zeros(), complete: true };
             if gap(own, other).lower <= 0.0 {
                 let found = overlap(own, other);
-                (bounds.lower, bounds.shift) = (found.lower.max(0.0), found.way * found.upper.max(0.0));
+                (bounds.lower, bounds.shift) = (found.lower.max(0.0), beyond([own, other], &found));
             }
             bounds
         });
@@ -93,4 +93,22 @@ impl<'a> ShapePair<'a> {
         let frame = b.frame_of(a.pose())?;
         Some(ask(&Solid::new(a.shape(), &Pose::IDENTITY)?, &Solid::new(b.shape(), &frame)?))
     }
+}
+
+/// A shift of the second of two shapes that is a little longer than their overlap, and separates them.
+fn beyond([a, b]: [&Solid<'_>; 2], found: &Overlap) -> Vector3<f64> {
+    /// Doublings of what is added.
+    const ROUNDS: u32 = 32;
+    let size = a.half.amax() + b.half.amax() + a.radius + b.radius;
+    let far = a.centre.amax() + b.centre.amax();
+    let mut more = 1e-15 * (size + far);
+    let mut length = found.upper.max(0.0);
+    for _ in 0..ROUNDS {
+        if gap(a, &b.shifted(&(found.way * length))).lower > 0.0 {
+            break;
+        }
+        length = found.upper.max(0.0) + more;
+        more *= 2.0;
+    }
+    found.way * length
 }

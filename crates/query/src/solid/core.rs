@@ -342,7 +342,7 @@ impl<'a> Solid<'a> {
         let away = x - on_core;
         let distance = away.norm();
         // On the core, up to rounding.
-        if distance > 1e-12 * (self.half.norm() + self.radius) {
+        if distance > 1e-12 * (self.half.norm() + self.radius) + 4e-16 * x.amax() {
             return (distance < self.radius).then(|| (self.radius - distance, -away / distance));
         }
         let (depth, out) = match self.core {
@@ -352,7 +352,8 @@ impl<'a> Solid<'a> {
                 inner_depth(|d| self.support(d) - x, scale)
             }
         };
-        (self.radius + depth > 0.0).then_some((self.radius + depth, -out))
+        let uphill = if depth > 0.0 { -out } else { Vector::zeros() };
+        (self.radius + depth > 0.0).then_some((self.radius + depth, uphill))
     }
 
     /// The distance of `x` from the core.

@@ -32,12 +32,14 @@ struct Polytope {
 }
 
 /// Returns a lower bound of the distance of the origin from the boundary of a convex shape that contains
-/// it, and the normal of the nearest face of the polytope. Zero if the shape is flat. `scale` is the size
-/// of the shape.
+/// it, and the normal of the nearest face of the polytope. If the shape is flat, zero and a normal of it.
+/// `scale` is the size of the shape.
 pub(crate) fn inner_depth(support: impl Fn(&Vector) -> Vector, scale: f64) -> (f64, Vector) {
-    let flat = (0.0, Vector::zeros());
-    let Some(mut polytope) = Polytope::new(&support, scale) else { return flat };
-    let mut best = flat;
+    let mut polytope = match Polytope::new(&support, scale) {
+        Ok(polytope) => polytope,
+        Err(normal) => return (0.0, normal),
+    };
+    let mut best = (0.0, Vector::zeros());
     loop {
         let [_, count] = polytope.counts;
         let nearest = polytope.faces[..count].iter().min_by(|a, b| a.height.total_cmp(&b.height));
@@ -53,8 +55,8 @@ pub(crate) fn inner_depth(support: impl Fn(&Vector) -> Vector, scale: f64) -> (f
 }
 
 impl Polytope {
-    /// A tetrahedron of points of the shape; `None` if the shape is flat.
-    fn new(support: &impl Fn(&Vector) -> Vector, scale: f64) -> Option<Self> {
+    /// A tetrahedron of points of the shape; a unit normal of the shape if it is flat.
+    fn new(support: &impl Fn(&Vector) -> Vector, scale: f64) -> Result<Self, Vector> {
         /// Less than this is flat, relative to the size.
         const FLAT: f64 = 1e-9;
         let p = support(&Vector::x());
@@ -66,17 +68,15 @@ impl Polytope {
             let furthest = if of(&low) > of(&high) { low } else { high };
             (of(&furthest) > FLAT * scale).then_some(furthest)
         };
-        let q = if (q - p).norm() > FLAT * scale {
-            q
-        } else {
-            off(&Vector::y()).or_else(|| off(&Vector::z()))?
-        };
-        let along = (q - p).normalize();
+        let is_wide = (q - p).norm() > FLAT * scale;
+        let q = if is_wide { Some(q) } else { off(&Vector::y()).or_else(|| off(&Vector::z())) };
+        let along = (q.ok_or_else(Vector::x)? - p).normalize();
         let least = along.iamin();
         let across = along.cross(&Vector::from_fn(|k, _| if k == least { 1.0 } else { 0.0 })).normalize();
-        let r = off(&across).or_else(|| off(&along.cross(&across)))?;
-        let normal = (q - p).cross(&(r - p)).try_normalize(0.0)?;
-        let s = off(&normal)?;
+        let r = off(&across).or_else(|| off(&along.cross(&across))).ok_or(across)?;
+        let normal = along.cross(&(r - p)).try_normalize(0.0).ok_or(across)?;
+        let s = off(&normal).ok_or(normal)?;
+        let q = q.unwrap_or(p);
         let none = Face { corners: [0; 3], normal: Vector::zeros(), height: 0.0 };
         let mut polytope =
             Self { vertices: [Vector::zeros(); VERTICES], faces: [none; FACES], counts: [4, 0] };
@@ -85,9 +85,9 @@ impl Polytope {
         let turned = if is_above { [0, 2, 1, 3] } else { [0, 1, 2, 3] };
         // Each face is seen anticlockwise from the outside.
         for [i, j, k] in [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]] {
-            polytope.add([turned[i], turned[j], turned[k]])?;
+            polytope.add([turned[i], turned[j], turned[k]]).ok_or(normal)?;
         }
-        Some(polytope)
+        Ok(polytope)
     }
 
     /// Adds a face; `None` if it has no area or there is no room.

@@ -24,7 +24,7 @@ pub(crate) struct Overlap {
 /// The differences of points of b and of a are a convex set K. Both meet if the origin is in K grown by
 /// both radii, and the least shift is the distance of the origin from the boundary of that. If the cores are
 /// apart, it is the radii less the distance of the cores. Otherwise it is the radii and the depth of the
-/// origin in K ([`inner_depth`]). A shift by the extent of K along any direction is enough, so the upper
+/// origin in K ([`inner_depth`]), which is 0 if K is flat. A shift by the extent of K along any direction is enough, so the upper
 /// bound is the least of a few directions.
 pub(crate) fn overlap(a: &Solid<'_>, b: &Solid<'_>) -> Overlap {
     let radii = a.radius + b.radius;
@@ -36,16 +36,17 @@ pub(crate) fn overlap(a: &Solid<'_>, b: &Solid<'_>) -> Overlap {
     };
     let apart = closest(|d| points(&-d), a.inside - b.inside, f64::INFINITY);
     let size = a.half.amax() + b.half.amax();
-    if apart.distance > 1e-9 * size
-        && let Some(way) = (apart.points[1] - apart.points[0]).try_normalize(0.0)
-    {
-        let upper = enough(a, b, &way);
-        return Overlap { lower: (radii - apart.distance).min(upper), upper, way };
+    let between = (apart.points[1] - apart.points[0]).try_normalize(0.0).unwrap_or_else(Vector::zeros);
+    if apart.distance > 1e-9 * size {
+        let upper = enough(a, b, &between);
+        return Overlap { lower: (radii - apart.distance).min(upper), upper, way: between };
     }
     let (depth, normal) = inner_depth(support, size);
+    // The origin may be beside K, by less than the tolerance.
+    let depth = if depth > 0.0 { depth } else { -apart.distance };
     let mut best = Overlap { lower: radii + depth, upper: f64::INFINITY, way: Vector::z() };
     let edges = a.axes.iter().flat_map(|x| b.axes.iter().map(|y| x.cross(y)));
-    for way in std::iter::once(normal).chain(a.axes).chain(b.axes).chain(edges) {
+    for way in [normal, between].into_iter().chain(a.axes).chain(b.axes).chain(edges) {
         let Some(way) = way.try_normalize(1e-9) else { continue };
         for way in [way, -way] {
             let upper = enough(a, b, &way);

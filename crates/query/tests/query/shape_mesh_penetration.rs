@@ -108,15 +108,17 @@ fn shapes_in_open_meshes() {
                 assert!(!found.complete || found.upper == 0.0 || radius == 0.0, "{shape:?} {found:?}");
                 continue;
             }
-            touching += 1;
-            useful += u32::from(found.lower >= 0.5 * found.upper);
+            if budget == Budget::UNLIMITED {
+                touching += 1;
+                useful += u32::from(found.lower >= 0.5 * found.upper);
+            }
             for _ in 0..20 {
                 let t = Vector::from(unit_vector(rng)) * (found.lower * rng.random_range(0.0..0.9999));
                 assert!(distance(t, scratch).is_some(), "{t} of {found:?} parts {shape:?}");
             }
         }
     }
-    assert!(touching > 80 && useful * 5 > touching * 4, "{touching} touching, {useful} with half the bound");
+    assert!(touching > 50 && useful * 5 > touching * 4, "{touching} touching, {useful} with half the bound");
 }
 
 /// Spheres and boxes inside a closed box of a mesh, at scales, which no triangle touches.
@@ -144,6 +146,71 @@ fn shapes_inside_closed_meshes() {
     }
 }
 
+/// The work of a search ends near its limit.
+#[test]
+fn searches_end_with_their_budget() {
+    let mesh = box_mesh([1.0, 1.2, 1.5]);
+    let parts = MeshSolid::new(&mesh);
+    let (shape, pose) =
+        (Shape::Sphere { centre: [0.0; 3], radius: 0.3 }, Pose::from_translation([0.9, 0.1, 0.2]));
+    let scratch = &mut Scratch::default();
+    let mut ask =
+        |budget: &Budget| of_mesh((&mesh, &parts, &Pose::IDENTITY), (&shape, &pose), budget, scratch);
+    let whole = ask(&Budget::UNLIMITED);
+    assert!(whole.complete && whole.statistics.evaluations > 500, "{whole:?}");
+    for work in [1, 20, 200] {
+        let found = ask(&Budget::UNLIMITED.with_work(work));
+        // A shift looks at the triangles of the mesh once.
+        assert!(!found.complete && found.statistics.evaluations <= work + 26, "{found:?}");
+        assert!(found.lower <= whole.upper && found.upper >= whole.upper * (1.0 - 1e-5), "{found:?}");
+    }
+}
+
+/// Cores that are flat together, apart by less than rounding, or far from the origin.
+#[test]
+fn flat_and_far_shapes_have_tight_bounds() {
+    let ball = |centre, radius| Shape::Sphere { centre, radius };
+    let pair = |a: &Shape<'_>, b: &Shape<'_>| {
+        ShapePair::new(a.at(&Pose::IDENTITY), b.at(&Pose::IDENTITY)).penetration()
+    };
+    // Beside the longest edge, in the plane of the triangle.
+    let triangle =
+        Shape::Triangle { points: [[0.0; 3], [1000.0, 0.0, 0.0], [0.0, 1000.0, 0.0]], radius: 0.0 };
+    let off = 4e-7 / 2.0_f64.sqrt();
+    for radius in [1e-6, 4.1e-7] {
+        let found = pair(&triangle, &ball([500.0 + off, 500.0 + off, 0.0], radius));
+        let exact = radius - 4e-7;
+        assert!((found.lower - exact).abs() < 1e-11 && (found.upper - exact).abs() < 1e-10, "{found:?}");
+    }
+    // A square that is tilted by 45 degrees.
+    let h = 0.125_f64.sqrt();
+    let square = [[-0.5, -h, -h], [0.5, -h, -h], [-0.5, h, h], [0.5, h, h]];
+    let found = pair(&Shape::Hull { points: &square, radius: 0.0 }, &ball([0.0; 3], 0.1));
+    assert!(found.lower > 0.1 - 1e-9 && found.upper < 0.1 + 1e-8, "{found:?}");
+    assert!((found.direction[1] + found.direction[2]).abs() < 1e-6, "{found:?}");
+    let line = [[0.0; 3], [1.0, 2.0, 3.0], [2.0, 4.0, 6.0]];
+    let found = pair(&Shape::Hull { points: &line, radius: 0.0 }, &ball([0.5, 1.0, 1.5], 0.1));
+    assert!(found.lower > 0.1 - 1e-9 && found.upper < 0.1 + 1e-8, "{found:?}");
+    // The shift separates, without more.
+    let rng = &mut rng(6620);
+    for round in 0..300 {
+        let far = [0.0, 1e3, 1e6][round % 3];
+        let radius = [0.0, 0.2][round % 2];
+        let at = |rng: &mut _| rotation(rng).with_translation(point_in(rng, 0.7).map(|c| c + far));
+        let a = Shape::Box { pose: at(rng), half: [0.5, 0.4, 0.3], radius };
+        let b = Shape::Cylinder { pose: at(rng), half_height: 0.4, radius: 0.3, rounding: 0.0 };
+        let found = pair(&a, &b);
+        if found.upper == 0.0 {
+            continue;
+        }
+        let out = Pose::from_translation(found.direction.map(|c| c * found.upper));
+        let gap = ShapePair::new(a.at(&Pose::IDENTITY), b.at(&out)).distance().unwrap();
+        let off = 1e-9 + 1e-15 * far;
+        assert!(gap.upper < 1e-6 + 1e2 * off, "{found:?} {gap:?}");
+        assert!(gap.lower > 0.0 || far > 0.0, "{found:?} {gap:?}");
+    }
+}
+
 /// An invalid shape, pose or solid gives no known penetration.
 #[test]
 fn invalid_pairs_have_no_penetration() {
@@ -163,5 +230,5 @@ fn invalid_pairs_have_no_penetration() {
         ShapePair::new(a.at(&Pose::IDENTITY), b.at(&Pose::IDENTITY)).penetration().upper
     };
     assert_eq!(pair(ball(0.5), ball(f64::NAN)), f64::INFINITY);
-    assert_eq!(pair(ball(0.5), ball(0.25)), 0.75);
+    assert!((pair(ball(0.5), ball(0.25)) - 0.75).abs() < 1e-8);
 }
