@@ -1499,8 +1499,9 @@ NearmissStatus nearmiss_cast_all(const struct NearmissPlan *plan,
 
 /*
  Bounds how far the second scan must be moved, in any direction, to be separate from the first. `solids`
- is a `NearmissSolids`. Without solids and thickened points, the lower bound is 0. `limits` may be null. Takes
- as long as some hundred calls of `nearmiss_collide`. Thread safety: one call at a time for each scratch.
+ is a `NearmissSolids`. Without solids and thickened points, the lower bound is 0. `limits` may be null.
+ Takes as long as some hundred calls of `nearmiss_collide`. Thread safety: one call at a time for each
+ scratch.
  */
 NearmissStatus nearmiss_penetration(const struct NearmissPlan *plan,
                                     const struct NearmissPlaced *a,

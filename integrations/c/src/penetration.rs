@@ -68,8 +68,9 @@ fn interiors(solids: i32, last: Solids) -> Result<[Interior; 2], Failure> {
 }
 
 /// Bounds how far the second scan must be moved, in any direction, to be separate from the first. `solids`
-/// is a `NearmissSolids`. Without solids and thickened points, the lower bound is 0. `limits` may be null. Takes
-/// as long as some hundred calls of `nearmiss_collide`. Thread safety: one call at a time for each scratch.
+/// is a `NearmissSolids`. Without solids and thickened points, the lower bound is 0. `limits` may be null.
+/// Takes as long as some hundred calls of `nearmiss_collide`. Thread safety: one call at a time for each
+/// scratch.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_penetration(
     plan: Option<&Plan>,

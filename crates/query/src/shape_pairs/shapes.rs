@@ -59,7 +59,8 @@ impl<'a> ShapePair<'a> {
     /// few percent for most round cores. Needs no budget.
     ///
     /// Grows a polytope inside the set of all differences of points of both cores (van den Bergen 2001).
-    /// Takes up to 64 points of it, so some tens of microseconds for hulls of a few points. Does not allocate.
+    /// Takes up to 64 points of it, so some tens of microseconds for hulls of a few points. Does not
+    /// allocate.
     ///
     /// ```
     /// use nearmiss_geometry::Pose;

@@ -24,8 +24,8 @@ pub(crate) struct Overlap {
 /// The differences of points of b and of a are a convex set K. Both meet if the origin is in K grown by
 /// both radii, and the least shift is the distance of the origin from the boundary of that. If the cores are
 /// apart, it is the radii less the distance of the cores. Otherwise it is the radii and the depth of the
-/// origin in K ([`inner_depth`]), which is 0 if K is flat. A shift by the extent of K along any direction is enough, so the upper
-/// bound is the least of a few directions.
+/// origin in K ([`inner_depth`]), which is 0 if K is flat. A shift by the extent of K along any direction is
+/// enough, so the upper bound is the least of a few directions.
 pub(crate) fn overlap(a: &Solid<'_>, b: &Solid<'_>) -> Overlap {
     let radii = a.radius + b.radius;
     let origin = a.centre;
