@@ -17,9 +17,11 @@ pub enum Interior {
     Solid,
 }
 
-/// The penetration of two scans, meshes or convex shapes, or of two different ones of these, in world units:
-/// lower ≤ length of the least shift that separates them ≤ upper. Of two alike b is shifted; otherwise the
-/// shape or, if there is none, the mesh.
+/// The penetration of two things, in world units: lower ≤ length of the least shift that separates them ≤
+/// upper.
+///
+/// The second of two scans, of two meshes or of two shapes is shifted. A shape is shifted out of a scan or a
+/// mesh, and a mesh out of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penetration {
     /// A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found.
@@ -31,10 +33,11 @@ pub struct Penetration {
     pub upper: f64,
     /// The unit vector along which the shift of length [`Self::upper`] is. 0 if none is needed or known.
     pub direction: [f64; 3],
-    /// The evidence for the separation after that shift. Certified without a scan. The shortest
-    /// shift out of a scan ends next to its surface, where most separations are estimated.
+    /// The evidence for the separation after that shift. Certified for meshes and shapes. The shortest shift
+    /// out of a scan ends next to its surface, where most separations are estimated.
     pub evidence: Evidence,
-    /// The length below which the scans do not determine the separation after the shift; 0 without a scan.
+    /// The length below which the scans do not determine the separation after the shift; 0 for meshes and
+    /// shapes.
     pub band: f64,
     /// `true` if the search ended before the budget did. The bounds may still differ.
     pub complete: bool,

@@ -110,6 +110,11 @@ impl<'s> ShapeMeshProbe<'s> {
         self.mesh.stored_to_world().apply(place.into()).into()
     }
 
+    /// Moves a place to the frame of the mesh's input.
+    fn in_input(&self, place: Vector) -> [f64; 3] {
+        self.mesh.pose().apply_inverse(self.in_world(place).into())
+    }
+
     fn solid_view(&self) -> SolidView<'s> {
         SolidView { mesh: self.mesh.mesh(), view: self.view, solid: self.parts, level: self.level }
     }
@@ -133,10 +138,9 @@ impl<'s> ShapeMeshProbe<'s> {
 
     /// Measures how deep the place of the mesh that is nearest to another one is in the shape.
     fn deep_at_surface(&self, place: Vector) -> Option<Deep> {
-        let (mesh, placed) = (self.mesh.mesh(), self.mesh.stored_to_world());
-        let own = self.mesh.pose().apply_inverse(self.in_world(place).into());
-        let on_mesh = self.mesh.pose().apply(foot(mesh, self.view, self.level, own));
-        let place = Vector::from(placed.apply_inverse(on_mesh));
+        let on_mesh = foot(self.mesh.mesh(), self.view, self.level, self.in_input(place));
+        let in_world = self.mesh.pose().apply(on_mesh);
+        let place = Vector::from(self.mesh.stored_to_world().apply_inverse(in_world));
         let (depth, uphill) = self.solid.depth(&place)?;
         Some(Deep { place, depth, uphill })
     }
@@ -149,9 +153,8 @@ impl Probe for ShapeMeshProbe<'_> {
         if self.is_touched(t) {
             return ControlFlow::Continue(false);
         }
-        let inside = self.in_world(self.solid.inside + t);
-        let is_nested = self.parts.is_closed()
-            && self.solid_view().contains(self.mesh.pose().apply_inverse(inside.into()));
+        let inside = self.solid.inside + t;
+        let is_nested = self.parts.is_closed() && self.solid_view().contains(self.in_input(inside));
         ControlFlow::Continue(!is_nested)
     }
 

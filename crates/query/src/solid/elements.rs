@@ -274,9 +274,11 @@ impl<'a> Elements<'a> {
 
     /// A disc and a distance from it within which the obstacle near a point on a sheet is.
     fn cell(&self, i: usize, centre: Vector, radius: f64) -> Option<(FlatDisc, f64)> {
+        if !self.arrays.is_on_sheet(i) {
+            return None;
+        }
         let slab = f64::from(SLAB * self.arrays.radii[i]) * (1.0 + 1e-6);
-        let disc = || FlatDisc { centre, normal: self.normal(i), radius };
-        self.arrays.is_on_sheet(i).then(|| (disc(), slab))
+        Some((FlatDisc { centre, normal: self.normal(i), radius }, slab))
     }
 
     /// Compares a core with the points of a block of a leaf, given by its number.
