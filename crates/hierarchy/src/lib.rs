@@ -34,7 +34,7 @@ pub use point::stored_point::StoredPoint;
 pub use scan::apart::{Extent, apart};
 pub use scan::arrays::ScanArrays;
 pub use scan::build::PointHierarchy;
-pub use scan::clearance::ClearanceGrid;
+pub use scan::clearance::{Clearance, ClearanceGrid};
 pub use scan::data::HierarchyMeta;
 pub use scan::deform_error::DeformError;
 pub use scan::deforming::DeformingScan;

@@ -67,7 +67,17 @@ impl Cubes {
     #[inline]
     #[must_use]
     pub fn about(&self, place: [f64; 3]) -> Option<(usize, f64)> {
-        let (mut cube, mut off_sq) = (0, 0.0);
+        let (cube, within) = self.locate(place)?;
+        let off = within.map(|c| (c - 0.5) * self.edge);
+        Some((cube, off.iter().map(|c| c * c).sum()))
+    }
+
+    /// Returns the number of the cube that contains a place, and the distances of the place from the first
+    /// corner of the cube along each axis, in edges; `None` outside the grid and for NaN.
+    #[inline]
+    #[must_use]
+    pub fn locate(&self, place: [f64; 3]) -> Option<(usize, [f64; 3])> {
+        let (mut cube, mut within) = (0, [0.0; 3]);
         for k in 0..3 {
             let at = self.along(k, place[k]);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
@@ -77,10 +87,10 @@ impl Cubes {
             }
             cube = cube * self.size[k] + number;
             #[expect(clippy::cast_precision_loss, reason = "a small number")]
-            let off = (at - number as f64 - 0.5) * self.edge;
-            off_sq += off * off;
+            let steps = number as f64;
+            within[k] = at - steps;
         }
-        Some((cube, off_sq))
+        Some((cube, within))
     }
 
     /// Returns the number of the cube that is this many cubes from the first along each axis.

@@ -56,19 +56,11 @@ impl Tree<'_> {
         self.descend_from(level, &Starts::ROOT, place, visitor)
     }
 
-    /// Visits a single leaf. Does nothing if the node is not a leaf.
-    pub fn visit_leaf<V: PlaceVisitor>(
-        &self,
-        level: Level,
-        leaf: NodeId,
-        visitor: &mut V,
-    ) -> ControlFlow<()> {
-        if !self.topology.is_leaf(leaf) {
-            return ControlFlow::Continue(());
-        }
+    /// Visits a single leaf, by its number.
+    pub fn visit_leaf<V: PlaceVisitor>(&self, level: Level, leaf: usize, visitor: &mut V) -> ControlFlow<()> {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || visitor.leaf(simd, self.topology.leaf_number(leaf)),
+            || visitor.leaf(simd, leaf),
         ))
     }
 

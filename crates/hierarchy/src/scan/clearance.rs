@@ -1,59 +1,129 @@
-//! A grid of lower bounds of the distance from the obstacle, and of near leaves. Most questions whether a
-//! small shape touches a scan are answered by one of its cells, or by the leaf of that cell.
+//! A grid of lower bounds of the distance from the obstacle, and of what is near. Most questions whether a
+//! small shape touches a scan are answered by one of its places, or by the point that is named there.
 
-use std::ops::Range;
+mod brick;
+mod page;
 
+use std::ops::{ControlFlow, Range};
+use std::sync::OnceLock;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, dispatch};
 use nearmiss_geometry::NodeId;
 use nearmiss_index::Cubes;
-use nearmiss_lanes::parallel::ranges_with;
-use nearmiss_lanes::vector::dot;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::{map_with, ranges_with};
+use nearmiss_lanes::vector::{dot, sub};
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
+use crate::descent::PlaceVisitor;
 use crate::scan::arrays::ScanArrays;
+use crate::scan::clearance::brick::Neighbours;
+use crate::scan::clearance::page::{Entry, Near, Page, Reach, in_part};
 use crate::tree::wide::Tree;
 
-/// The least edge of a cell, in sampling radii.
+/// The edge of a cube, in sampling radii, if the block of cubes has its least edge.
 const EDGE: f64 = 2.0;
 
-/// The greatest clearance of a cell, in edges. The grid continues as far about the obstacle.
-const MOST: f64 = 1.5;
+/// The greatest clearance of a block, in edges of the block. The grid continues as far about the obstacle.
+const MOST_OF_BLOCK: f64 = 1.5;
 
-/// The maximum number of cells for each point.
-const CELLS_A_POINT: f64 = 2.0;
+/// The greatest clearance of a cube, in edges.
+const MOST_OF_CUBE: f64 = 1.5;
 
-/// The maximum number of comparisons of a leaf and a cell, for each point.
+/// The clearance of the centre of a cube below which the cube has a brick, in edges: half the diagonal, and
+/// a little more than half an edge.
+const NEAR: f64 = 1.466;
+
+/// The greatest distance in a brick, in edges.
+const MOST_IN_BRICK: f64 = 1.0;
+
+/// The distance from the centre of a cube up to which its brick lists leaves, in edges.
+const LISTED: f64 = 1.35;
+
+/// The maximum number of blocks for each point.
+const BLOCKS_A_POINT: f64 = 1.0;
+
+/// The maximum number of comparisons of a leaf and a block, for each point.
 const COMPARED: f64 = 64.0;
 
-/// Steps of a stored clearance.
+/// Steps of a stored distance.
 const STEPS: f64 = 255.0;
 
 /// Rounding of distances in single precision, relative to all coordinates.
 const ROUNDING: f64 = 8e-6;
 
+/// The leaf of a block without one.
+const NO_LEAF: u32 = u32::MAX;
+
+/// The mark of a block without a page. The lower bits are its clearance in steps.
+const COARSE: u32 = 1 << 31;
+
 /// Parts of the grid that threads work on.
 const SHARE: usize = 16;
 
-/// The entry of a cell without a near leaf. The root of a tree with inner nodes is not a leaf, and in a
-/// tree of one leaf nothing is saved by naming it.
-const NONE: NodeId = NodeId::ROOT;
-
-/// A grid with the *clearance* of each cell, a lower bound of the distance of its centre from the obstacle,
-/// and a leaf that is near.
+/// Lower bounds of the distance of each place from the obstacle, and what is near.
+///
+/// Space is cut into blocks. A block near the obstacle is cut into 64 cubes, whose edges are about two
+/// sampling radii, and each of these that is nearer into 27 places. The content of a block is computed when
+/// it is first asked about, in about 0.1 ms, and kept.
 #[derive(Debug, Clone)]
 pub struct ClearanceGrid {
-    cubes: Cubes,
-    /// The clearances in steps.
-    clearances: Vec<u8>,
-    leaves: Vec<NodeId>,
-    step: f64,
+    blocks: Cubes,
+    /// For each block the number of its page, or its clearance.
+    entries: Vec<u32>,
+    /// A leaf that is near each block.
+    nearest: Vec<u32>,
+    /// The pages, and the blocks that they are of.
+    pages: Vec<(OnceLock<Page>, u32)>,
+    /// The enclosures of the leaves.
+    leaves: Vec<OrientedBox>,
+    /// The lengths of steps in blocks, cubes and bricks, and of lists.
+    steps: [f64; 4],
+    reach: Reach,
+    /// The rounding error of a distance.
+    lost: f64,
+    level: Level,
+}
+
+/// A place in a [`ClearanceGrid`]: what is near it.
+///
+/// Distances are lower bounds, at most zero where the parts may be.
+#[derive(Debug, Clone, Copy)]
+pub struct Clearance<'a> {
+    /// The distance from all discs with their thickness, and from all balls.
+    pub discs: f64,
+    /// The distance from the volumes that contain the obstacle.
+    pub obstacle: f64,
+    /// The distance from the enclosures of all leaves that are not listed.
+    listed: f64,
+    /// The neighbours of the cube, and the number of the place in it.
+    place: Option<(&'a Neighbours, usize)>,
+}
+
+impl Clearance<'_> {
+    /// The same distance from everything.
+    #[inline(always)]
+    const fn coarse(bound: f64) -> Self {
+        Self { discs: bound, obstacle: bound, listed: bound, place: None }
+    }
+
+    /// Returns the leaf, and the number in it, of the point whose disc or ball is nearest to a place close
+    /// by.
+    #[inline]
+    #[must_use]
+    pub fn nearest(&self) -> Option<(usize, usize)> {
+        let (neighbours, place) = self.place?;
+        neighbours.nearest(place)
+    }
 }
 
 impl ClearanceGrid {
-    /// Builds the grid of a scan from the enclosures of its leaves. `None` if one of these is unbounded, or
-    /// if many are near many cells. O(n).
+    /// Builds the grid of a scan. `None` if the enclosure of a leaf is unbounded, or if many are near many
+    /// blocks. O(n).
     #[must_use]
-    pub fn new(scan: &ScanArrays<'_>) -> Option<Self> {
+    pub fn new(scan: &ScanArrays<'_>, level: Level) -> Option<Self> {
         #[expect(clippy::cast_precision_loss, reason = "a count")]
         let points = scan.radii.len() as f64;
         let tree = &scan.tree;
@@ -61,12 +131,15 @@ impl ClearanceGrid {
         if !bounds.iter().flatten().all(|c| c.is_finite()) {
             return None;
         }
-        let least = EDGE * f64::from(scan.sampling_radius);
-        let cubes = Cubes::new(bounds, MOST, (least, CELLS_A_POINT * points));
-        let edge = cubes.edge();
-        let most = MOST * edge;
+        #[expect(clippy::cast_precision_loss, reason = "small")]
+        let side = page::SIDE as f64;
+        let least = side * EDGE * f64::from(scan.sampling_radius);
+        let blocks = Cubes::new(bounds, MOST_OF_BLOCK, (least, BLOCKS_A_POINT * points));
+        let edge = blocks.edge();
+        let most = MOST_OF_BLOCK * edge;
         let far = bounds.iter().flatten().fold(edge, |far, c| far.max(c.abs()));
-        let build = Build { tree, cubes: &cubes, most, lost: ROUNDING * (far + 2.0 * edge) };
+        let lost = ROUNDING * (far + 2.0 * edge);
+        let build = Build { tree, cubes: &blocks, most, lost };
         let compared: f64 = (0..tree.topology.leaves())
             .map(|number| {
                 let [min, max] = tree.enclosure(Part::Obstacle, tree.topology.leaf(number)).upright();
@@ -76,39 +149,166 @@ impl ClearanceGrid {
         if compared.is_nan() || compared > COMPARED * points.max(1e3) {
             return None;
         }
-        let slabs = cubes.size()[0];
+        let slabs = blocks.size()[0];
         let parts = ranges_with(slabs, slabs.div_ceil(SHARE), || (), |(), range| build.slabs(&range));
-        let count = cubes.count();
-        let (mut clearances, mut leaves) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        for part in parts {
-            clearances.extend(part.0);
-            leaves.extend(part.1);
+        let mut entries: Vec<u32> = Vec::with_capacity(blocks.count());
+        entries.extend(parts.iter().flatten().map(|near| COARSE | u32::from(near.0)));
+        let mut nearest: Vec<u32> = parts.into_iter().flatten().map(|near| near.1).collect();
+        spread(blocks.size(), &mut nearest);
+        let cube = edge / side;
+        let steps = [
+            most / STEPS,
+            MOST_OF_CUBE * cube / page::STEPS,
+            MOST_IN_BRICK * cube / STEPS,
+            LISTED * cube / STEPS,
+        ];
+        let beside = 0.867 * edge + MOST_OF_CUBE * cube;
+        let is_near = |entry: u32| f64::from(entry & !COARSE) * steps[0] < beside;
+        let near: Vec<usize> = (0..entries.len()).filter(|&block| is_near(entries[block])).collect();
+        #[expect(clippy::cast_possible_truncation, reason = "counted in `lost`")]
+        let single = |edges: f64| (edges * cube) as f32;
+        #[expect(clippy::cast_possible_truncation, reason = "an error")]
+        let reach = Reach {
+            edge: cube,
+            most: single(MOST_OF_CUBE),
+            near: single(NEAR),
+            in_brick: single(MOST_IN_BRICK),
+            listed: single(LISTED),
+            lost: lost as f32,
+        };
+        let mut pages = Vec::with_capacity(near.len());
+        for block in near {
+            entries[block] = id32(pages.len());
+            pages.push((OnceLock::new(), id32(block)));
         }
-        Some(Self { cubes, clearances, leaves, step: most / STEPS })
+        let enclosure = |number| tree.enclosure(Part::Obstacle, tree.topology.leaf(number));
+        let leaves = (0..tree.topology.leaves()).map(enclosure).collect();
+        Some(Self { blocks, entries, nearest, pages, leaves, steps, reach, lost, level })
     }
 
-    /// Returns a lower bound of the distance of a place from the obstacle. Zero, or less, if the obstacle
-    /// may be there. O(1).
+    /// Computes the content of all blocks, with all threads. `scan` must be that of the grid, as in
+    /// [`Self::at`].
+    pub fn complete(&self, scan: &ScanArrays<'_>) {
+        map_with(self.pages.len(), Near::default, |near, i| {
+            self.page(scan, i, near);
+        });
+    }
+
+    fn page(&self, scan: &ScanArrays<'_>, number: usize, near: &mut Near) -> &Page {
+        let (page, block) = &self.pages[number];
+        page.get_or_init(|| {
+            let (middle, half) = (self.blocks.centre(*block as usize), 0.5 * self.blocks.edge());
+            page::page((scan, &self.reach, self.level), middle.map(|c| c - half), near)
+        })
+    }
+
+    #[cold]
+    fn first_page(&self, scan: &ScanArrays<'_>, number: usize) -> &Page {
+        self.page(scan, number, &mut Near::default())
+    }
+
+    /// Returns what the grid of `scan` tells about a place. O(1).
     #[inline]
     #[must_use]
-    pub fn clearance(&self, place: [f64; 3]) -> f64 {
-        match self.cubes.about(place) {
-            Some((cell, off_sq)) => {
-                f64::from(self.clearances[cell]) * self.step - off_sq.sqrt() * (1.0 + 1e-9)
-            }
+    pub fn at(&self, scan: &ScanArrays<'_>, place: [f64; 3]) -> Clearance<'_> {
+        let [of_block, of_cube, of_place, of_list] = self.steps;
+        let Some((block, within)) = self.blocks.locate(place) else {
             // The grid continues this far beyond the obstacle.
-            None if place.iter().all(|c| c.is_finite()) => STEPS * self.step * (1.0 - 1e-9),
-            None => f64::NEG_INFINITY,
+            let is_place = place.iter().all(|c| c.is_finite());
+            return Clearance::coarse(if is_place {
+                STEPS * of_block * (1.0 - 1e-9)
+            } else {
+                f64::NEG_INFINITY
+            });
+        };
+        let (edge, entry) = (self.blocks.edge(), self.entries[block]);
+        if entry & COARSE != 0 {
+            return Clearance::coarse(f64::from(entry & !COARSE) * of_block - edge * off(within));
         }
+        let (cube, within) = in_part::<{ page::SIDE }>(within);
+        let edge = edge / page::SIDE as f64;
+        let number = entry as usize;
+        let page = self.pages[number].0.get().unwrap_or_else(|| self.first_page(scan, number));
+        let (distances, neighbours) = match page.at(cube) {
+            Entry::Steps(steps) => return Clearance::coarse(f64::from(steps) * of_cube - edge * off(within)),
+            Entry::Brick(distances, neighbours) => (distances, neighbours),
+        };
+        let listed = f64::from(distances.listed) * of_list - edge * off(within);
+        let (number, within) = in_part::<{ brick::SIDE }>(within);
+        let off = edge / brick::SIDE as f64 * off(within);
+        let [discs, obstacle] = distances.at(number).map(|steps| f64::from(steps) * of_place - off);
+        Clearance { discs, obstacle, listed, place: Some((neighbours, number)) }
     }
 
-    /// Returns a leaf that is near a place, if there is one: of those whose enclosures are nearest to the
-    /// centre of the cell, that with the nearest centre. O(1).
+    /// Returns the number of a leaf that is about as near to a place as any other; `None` outside the grid.
     #[inline]
     #[must_use]
-    pub fn leaf(&self, place: [f64; 3]) -> Option<NodeId> {
-        let cell = self.cubes.at(place)?;
-        Some(self.leaves[cell]).filter(|&leaf| leaf != NONE)
+    pub fn leaf(&self, place: [f64; 3]) -> Option<usize> {
+        let leaf = self.nearest[self.blocks.at(place)?];
+        (leaf != NO_LEAF).then_some(leaf as usize)
+    }
+
+    /// Visits all leaves whose enclosures are within `most` of `place`, of which the grid told `clearance`,
+    /// until `visitor` ends the search. `None` if the grid does not list all of these leaves, because `most`
+    /// exceeds about one sampling radius.
+    #[inline]
+    pub fn visit_near<V: PlaceVisitor>(
+        &self,
+        level: Level,
+        (clearance, place): (&Clearance<'_>, [f64; 3]),
+        most: f64,
+        visitor: &mut V,
+    ) -> Option<ControlFlow<()>> {
+        if most.is_nan() || most > clearance.listed {
+            return None;
+        }
+        let (neighbours, _) = clearance.place?;
+        #[expect(clippy::cast_possible_truncation, reason = "counted in `lost`")]
+        let (place, most) = (place.map(|c| c as f32), ((most + self.lost) as f32).next_up());
+        let most_sq = (most * most).next_up();
+        Some(dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                for &leaf in neighbours.leaves() {
+                    let bounds = &self.leaves[leaf as usize];
+                    if distance_sq(bounds, sub(place, bounds.centre)) <= most_sq {
+                        visitor.leaf(simd, leaf as usize)?;
+                    }
+                }
+                ControlFlow::Continue(())
+            },
+        )))
+    }
+
+    /// Returns the edge of a cube.
+    #[must_use]
+    pub fn edge(&self) -> f64 {
+        self.blocks.edge() / page::SIDE as f64
+    }
+}
+
+/// The distance of a place from the centre of its cube, in edges, rounded up.
+#[inline(always)]
+fn off(within: [f64; 3]) -> f64 {
+    within.map(|c| (c - 0.5) * (c - 0.5)).iter().sum::<f64>().sqrt() * (1.0 + 1e-9)
+}
+
+/// Gives each block without a leaf that of a block beside it, breadth first.
+fn spread([xs, ys, zs]: [usize; 3], nearest: &mut [u32]) {
+    let mut front: Vec<usize> = (0..nearest.len()).filter(|&block| nearest[block] != NO_LEAF).collect();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for block in front {
+            let [x, y, z] = [block / (ys * zs), block / zs % ys, block % zs];
+            for (at, size, step) in [(x, xs, ys * zs), (y, ys, zs), (z, zs, 1)] {
+                for beside in [(at > 0).then(|| block - step), (at + 1 < size).then(|| block + step)] {
+                    let Some(beside) = beside.filter(|&beside| nearest[beside] == NO_LEAF) else { continue };
+                    nearest[beside] = nearest[block];
+                    next.push(beside);
+                }
+            }
+        }
+        front = next;
     }
 }
 
@@ -122,29 +322,18 @@ struct Build<'s> {
     lost: f64,
 }
 
-/// The nearest leaf of a cell, of those that were compared with it.
-#[derive(Debug, Clone, Copy)]
-struct Nearest {
-    /// The squared distance from the enclosure.
-    square: f32,
-    /// The squared distance from its centre.
-    centre_sq: f32,
-    leaf: NodeId,
-}
-
 impl Build<'_> {
-    /// The clearances and leaves of the cells in some slabs along the first axis.
+    /// The clearances of the blocks in some slabs along the first axis, in steps, and the leaves whose
+    /// enclosures are nearest to their centres.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is counted in `lost`")]
-    fn slabs(&self, slabs: &Range<usize>) -> (Vec<u8>, Vec<NodeId>) {
+    fn slabs(&self, slabs: &Range<usize>) -> Vec<(u8, u32)> {
         let Self { tree, cubes, most, lost } = self;
         let [_, ys, zs] = cubes.size();
         let first = slabs.start * ys * zs;
         let far = (most + 2.0 * lost) as f32;
-        let nothing = Nearest { square: far * far, centre_sq: f32::INFINITY, leaf: NONE };
-        let mut cells = vec![nothing; slabs.len() * ys * zs];
+        let mut nearest = vec![(far * far, NO_LEAF); slabs.len() * ys * zs];
         for number in 0..tree.topology.leaves() {
-            let leaf = tree.topology.leaf(number);
-            let bounds = tree.enclosure(Part::Obstacle, leaf);
+            let bounds = tree.enclosure(Part::Obstacle, tree.topology.leaf(number));
             let Some([xs, ys, zs]) = self.near(&bounds, slabs) else { continue };
             let centre = bounds.centre.map(f64::from);
             for (x, y) in xs.flat_map(|x| ys.clone().map(move |y| (x, y))) {
@@ -152,11 +341,11 @@ impl Build<'_> {
                 let start = cubes.centre(row + first);
                 let mut away = [0, 1, 2].map(|k| (start[k] - centre[k]) as f32);
                 let mut height = start[2] - centre[2];
-                for cell in &mut cells[row..row + zs.len()] {
+                for own in &mut nearest[row..row + zs.len()] {
                     away[2] = height as f32;
-                    let own = Nearest::new(&bounds, away, leaf);
-                    if own.is_nearer_than(cell) {
-                        *cell = own;
+                    let square = distance_sq(&bounds, away);
+                    if square < own.0 {
+                        *own = (square, id32(number));
                     }
                     height += cubes.edge();
                 }
@@ -164,11 +353,11 @@ impl Build<'_> {
         }
         let steps = STEPS / most;
         #[expect(clippy::cast_sign_loss, reason = "rounded down, saturates")]
-        let stored = |cell: &Nearest| ((f64::from(cell.square.sqrt()) - lost) * steps * (1.0 - 1e-9)) as u8;
-        (cells.iter().map(stored).collect(), cells.iter().map(|cell| cell.leaf).collect())
+        let stored = |square: f32| ((f64::from(square.sqrt()) - lost) * steps * (1.0 - 1e-9)) as u8;
+        nearest.into_iter().map(|(square, leaf)| (stored(square), leaf)).collect()
     }
 
-    /// The cells, within some slabs, whose centres may be near a box, along each axis; `None` if there are
+    /// The cubes, within some slabs, whose centres may be near a box, along each axis; `None` if there are
     /// none.
     fn near(&self, bounds: &OrientedBox, slabs: &Range<usize>) -> Option<[Range<usize>; 3]> {
         let (size, within) = (self.cubes.size(), self.most + 2.0 * self.lost);
@@ -185,77 +374,184 @@ impl Build<'_> {
     }
 }
 
-impl Nearest {
-    /// A leaf with this enclosure, and a place that is `away` from the centre of it.
-    fn new(bounds: &OrientedBox, away: [f32; 3], leaf: NodeId) -> Self {
-        let mut square = 0.0;
-        for k in 0..3 {
-            let beyond = (dot(away, bounds.axes[k]).abs() - bounds.half[k]).max(0.0);
-            square += beyond * beyond;
-        }
-        Self { square, centre_sq: dot(away, away), leaf }
+#[inline(always)]
+/// The squared distance of a place from a box from whose centre it is `away`.
+fn distance_sq(bounds: &OrientedBox, away: [f32; 3]) -> f32 {
+    let mut square = 0.0;
+    for k in 0..3 {
+        let beyond = (dot(away, bounds.axes[k]).abs() - bounds.half[k]).max(0.0);
+        square += beyond * beyond;
     }
-
-    fn is_nearer_than(&self, other: &Self) -> bool {
-        self.square < other.square || self.square == other.square && self.centre_sq < other.centre_sq
-    }
+    square
 }
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::Simd;
     use nearmiss_geometry::PointCloud;
+    use nearmiss_geometry::nalgebra::Vector3;
     use nearmiss_testdata::arbitrary::{CloudKind, cloud, point_in, rng};
+    use rand::RngExt;
 
     use super::*;
+    use crate::point::kind::{SLAB, THICKNESS};
     use crate::{BuildOptions, PointHierarchy};
 
-    /// The clearance of a random place is at most the distance from the enclosures of all leaves, and the
-    /// leaf of its cell is the nearest one.
+    type Vector = Vector3<f64>;
+
+    /// The distances of a place from the disc or ball of a point, and from the volume that contains the
+    /// obstacle near it.
+    fn distances(scan: &ScanArrays<'_>, i: usize, place: [f64; 3]) -> [f64; 2] {
+        let away = Vector::from(place) - Vector::from(scan.position(i).map(f64::from));
+        let reach = f64::from(scan.obstacle_reach(i));
+        if !scan.is_on_sheet(i) {
+            return [(away.norm() - reach).max(0.0); 2];
+        }
+        let height = away.dot(&Vector::from(scan.normals[i].map(f64::from)).normalize());
+        let beside = (away.norm_squared() - height * height).max(0.0).sqrt();
+        let disc = f64::from(scan.discs.get(i));
+        let from = |radius: f64, thick: f64| (height.hypot((beside - radius).max(0.0)) - thick).max(0.0);
+        [from(disc, f64::from(THICKNESS) * disc), from(reach, f64::from(SLAB * scan.radii[i]))]
+    }
+
+    fn from_enclosure(scan: &ScanArrays<'_>, leaf: usize, place: [f64; 3]) -> f64 {
+        let bounds = scan.tree.enclosure(Part::Obstacle, scan.tree.topology.leaf(leaf));
+        let away = [0, 1, 2].map(|k| place[k] - f64::from(bounds.centre[k]));
+        let beyond = [0, 1, 2].map(|k| {
+            let along: f64 = (0..3).map(|j| away[j] * f64::from(bounds.axes[k][j])).sum();
+            (along.abs() - f64::from(bounds.half[k])).max(0.0)
+        });
+        Vector::from(beyond).norm()
+    }
+
+    struct Visited(Vec<usize>);
+
+    impl PlaceVisitor for Visited {
+        fn most_sq(&self) -> f32 {
+            f32::INFINITY
+        }
+
+        fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
+            self.0.push(number);
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// How often the grid told what, and how far below the truth.
+    #[derive(Debug, Default)]
+    struct Seen {
+        grids: u32,
+        free: u32,
+        lost: f64,
+        lost_obstacle: f64,
+        named: u32,
+        listed: u32,
+        unlisted: u32,
+    }
+
+    impl Seen {
+        fn check(&mut self, scan: &ScanArrays<'_>, grid: &ClearanceGrid, place: [f64; 3]) {
+            let rounding = 1e-5 * (f64::from(scan.tree.root_box().radius()) + grid.edge());
+            let all = |i: usize| distances(scan, i, place);
+            let nearest = (0..scan.radii.len())
+                .map(all)
+                .fold([f64::INFINITY; 2], |least, own| [least[0].min(own[0]), least[1].min(own[1])]);
+            let at = grid.at(scan, place);
+            for (told, exact) in [at.discs, at.obstacle].into_iter().zip(nearest) {
+                assert!(told <= exact + 1e-12, "{place:?} has {told}, not {exact}");
+            }
+            if nearest[1] > 0.0 && nearest[0] < grid.edge() {
+                self.free += 1;
+                self.lost += (nearest[0] - at.discs) / grid.edge();
+                self.lost_obstacle += (nearest[1] - at.obstacle) / grid.edge();
+            }
+            if let Some((leaf, number)) = at.nearest() {
+                self.named += 1;
+                let own = distances(scan, scan.leaves.points(leaf).start + number, place)[0];
+                // It is nearest to a place that is at most half the diagonal of a sixth of a cube away.
+                let most = nearest[0] + grid.edge() * 3.0_f64.sqrt() / 3.0 + rounding;
+                assert!(own <= most, "{place:?}: point {number} of leaf {leaf} at {own} of {most}");
+            }
+            if let Some(leaf) = grid.leaf(place) {
+                assert!(leaf < scan.tree.topology.leaves());
+            }
+            let within = 0.5 * grid.edge();
+            let mut visited = Visited(Vec::new());
+            let near = (&at, place);
+            match grid.visit_near(Level::new(), near, within, &mut visited) {
+                None => self.unlisted += u32::from(at.nearest().is_some()),
+                Some(_) => {
+                    self.listed += 1;
+                    for leaf in 0..scan.tree.topology.leaves() {
+                        let distance = from_enclosure(scan, leaf, place);
+                        let is_visited = visited.0.contains(&leaf);
+                        assert!(is_visited || distance > within, "{place:?}: not leaf {leaf} at {distance}");
+                        assert!(!is_visited || distance <= within + 2.0 * rounding);
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
-    fn clearances_are_bounds_and_leaves_are_near() {
+    fn the_grid_tells_bounds_and_what_is_near() {
         let rng = &mut rng(9401);
-        let (mut free, mut built, mut lost) = (0, 0, 0.0);
+        let mut seen = Seen::default();
         for kind in CloudKind::ALL {
             let points = cloud(kind, 900, 7);
             let Ok(cloud) = PointCloud::from_positions(&points) else { continue };
             let Ok(scan) = PointHierarchy::build(&cloud, &BuildOptions::default()) else { continue };
             let arrays = scan.arrays();
-            let Some(grid) = ClearanceGrid::new(&arrays) else { continue };
-            built += 1;
-            let topology = arrays.tree.topology;
-            let leaves: Vec<NodeId> = (0..topology.leaves()).map(|n| topology.leaf(n)).collect();
-            let distance = |place: [f64; 3], leaf: NodeId| {
-                let bounds = arrays.tree.enclosure(Part::Obstacle, leaf);
-                let away = [0, 1, 2].map(|k| place[k] - f64::from(bounds.centre[k]));
-                let beyond =
-                    bounds.axes.map(|axis| (0..3).map(|k| away[k] * f64::from(axis[k])).sum::<f64>().abs());
-                let square: f64 =
-                    (0..3).map(|k| (beyond[k] - f64::from(bounds.half[k])).max(0.0).powi(2)).sum();
-                square.sqrt()
-            };
+            let Some(grid) = ClearanceGrid::new(&arrays, Level::new()) else { continue };
+            seen.grids += 1;
             let root = scan.root_box();
-            let half = 1.5 * f64::from(root.radius());
-            for _ in 0..2000 {
-                let place = [0, 1, 2].map(|k| f64::from(root.centre[k]) + point_in(rng, half)[k]);
-                let nearest =
-                    |place| leaves.iter().map(|&leaf| distance(place, leaf)).fold(f64::INFINITY, f64::min);
-                let (told, exact) = (grid.clearance(place), nearest(place));
-                assert!(told <= exact + 1e-9 * half, "{kind:?}: {place:?} has {told}, not {exact}");
-                if told > 0.0 && exact < grid.cubes.edge() {
-                    free += 1;
-                    lost += (exact - told) / grid.cubes.edge();
-                }
-                if let Some(leaf) = grid.leaf(place) {
-                    let centre = grid.cubes.centre(grid.cubes.at(place).expect("in the grid"));
-                    let off = distance(centre, leaf) - nearest(centre);
-                    assert!(off <= 1e-5 * half, "{kind:?}: {leaf:?} at {place:?}");
-                }
+            for round in 0..600 {
+                let place = if round % 3 == 0 {
+                    let half = 1.5 * f64::from(root.radius());
+                    [0, 1, 2].map(|k| f64::from(root.centre[k]) + point_in(rng, half)[k])
+                } else {
+                    let point = arrays.position(rng.random_range(0..scan.len()));
+                    [0, 1, 2].map(|k| f64::from(point[k]) + point_in(rng, grid.edge())[k])
+                };
+                seen.check(&arrays, &grid, place);
             }
         }
-        println!("{built} grids, {free} places, {:.3} edges lost on average", lost / f64::from(free));
-        assert!(
-            built >= 8 && free > 1000 && lost < 0.6 * f64::from(free),
-            "{built} grids, {free} places, {lost}"
-        );
+        println!("{seen:?}");
+        let Seen { grids, free, lost, lost_obstacle, named, listed, unlisted } = seen;
+        assert!(grids >= 8 && free > 1000 && named > 3000, "{seen:?}");
+        assert!(lost.max(lost_obstacle) < 0.35 * f64::from(free), "{seen:?}");
+        assert!(listed > 2000 && unlisted > 0, "{seen:?}");
+    }
+
+    #[test]
+    fn places_that_are_none_are_not_free() {
+        let points = cloud(CloudKind::ALL[0], 500, 7);
+        let cloud = PointCloud::from_positions(&points).unwrap();
+        let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let grid = ClearanceGrid::new(&scan.arrays(), Level::new()).unwrap();
+        for place in [[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0]] {
+            let at = grid.at(&scan.arrays(), place);
+            assert!(at.discs == f64::NEG_INFINITY && at.obstacle == f64::NEG_INFINITY);
+            assert_eq!(grid.leaf(place), None);
+        }
+        assert!(grid.at(&scan.arrays(), [1e300; 3]).obstacle > 0.0);
+    }
+
+    /// Pages that are made one after the other are those that are made at once.
+    #[test]
+    fn a_complete_grid_tells_the_same() {
+        let points = cloud(CloudKind::ALL[0], 900, 7);
+        let cloud = PointCloud::from_positions(&points).unwrap();
+        let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let arrays = scan.arrays();
+        let [complete, other] = [(); 2].map(|()| ClearanceGrid::new(&arrays, Level::new()).unwrap());
+        complete.complete(&arrays);
+        let rng = &mut rng(9402);
+        for i in 0..scan.len() {
+            let place =
+                arrays.position(i).map(|c| f64::from(c) + rng.random_range(-1.0..1.0) * complete.edge());
+            let [a, b] = [&complete, &other].map(|grid| grid.at(&arrays, place));
+            assert_eq!((a.discs, a.obstacle, a.nearest()), (b.discs, b.obstacle, b.nearest()));
+        }
     }
 }

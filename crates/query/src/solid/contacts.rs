@@ -23,6 +23,7 @@ use crate::solid::elements::Elements;
 use crate::solid::gather::{Candidate, Gather, Known, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
 use crate::solid::place::{Place, place_at, place_beside};
+use crate::solid::probe::is_far;
 use crate::solid::refine::refine;
 use crate::solid::sides::Sides;
 
@@ -91,12 +92,14 @@ pub(crate) fn contacts(
         found.clear();
         missed.clear();
         places.clear();
-        let mut near = Near::new(elements, solid, false);
-        near.limit(elements.margin);
-        let starts = elements.starts(solid, elements.margin);
-        // The visitor never breaks.
-        let search = &mut Gather { near, sides: &sides, found: &mut *found, missed: &mut *missed };
-        let _whole = near.descend(level, &starts, search);
+        if !is_far(elements, solid) {
+            let mut near = Near::new(elements, solid, false);
+            near.limit(elements.margin);
+            let starts = elements.starts(solid, elements.margin);
+            let search = &mut Gather { near, sides: &sides, found: &mut *found, missed: &mut *missed };
+            // The visitor never breaks.
+            let _whole = near.descend(level, &starts, search);
+        }
         let mut selection = Selection {
             elements,
             solid,

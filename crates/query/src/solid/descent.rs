@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{PlaceVisitor, Starts, Tree};
+use nearmiss_hierarchy::{Clearance, ClearanceGrid, PlaceVisitor, Starts, Tree};
 
 use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
@@ -43,6 +43,23 @@ impl<'s, 'a> Near<'s, 'a> {
         self.most = from_core + self.lane_box.slack;
         let of_boxes = self.most + (self.elements.beyond_boxes() as f32).next_up();
         self.most_sq = (of_boxes * of_boxes).next_up();
+    }
+
+    /// Visits the leaves within this distance of the shape, until `visitor` ends the search. `at` is what the
+    /// grid told about its centre.
+    #[inline]
+    pub(crate) fn search<V: PlaceVisitor>(
+        &self,
+        level: Level,
+        at: Option<(&ClearanceGrid, Clearance<'_>)>,
+        within: f64,
+        visitor: &mut V,
+    ) -> ControlFlow<()> {
+        let solid = self.solid;
+        let most = within + solid.radius + solid.half.norm();
+        let listed =
+            at.and_then(|(grid, at)| grid.visit_near(level, (&at, solid.centre.into()), most, visitor));
+        listed.unwrap_or_else(|| self.descend(level, &self.elements.starts(solid, within), visitor))
     }
 
     /// Visits the leaves near the shape below some nodes, until `visitor` ends the descent.

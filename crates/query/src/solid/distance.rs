@@ -39,8 +39,11 @@ pub(crate) fn distance(
     let mut search = Apart { near, upper: f64::INFINITY, best: None, lower: f64::INFINITY };
     search.near.limit(within / scale);
     // Ends early if they touch.
-    let near = search.near;
-    let _touching = near.descend(level, &elements.starts(solid, within / scale), &mut search);
+    if search.near_centre(level).is_continue() {
+        let near = search.near;
+        let starts = elements.starts(solid, search.upper.min(within / scale));
+        let _touching = near.descend(level, &starts, &mut search);
+    }
     let (i, gap) = search.best.filter(|_| search.upper * scale <= within)?;
     let upper = search.upper;
     let lower = match elements.semantics {
@@ -64,6 +67,18 @@ pub(crate) fn distance(
 }
 
 impl Apart<'_, '_> {
+    /// Compares the shape with what the grid names at its centre: a point or, further away, a leaf.
+    fn near_centre(&mut self, level: Level) -> ControlFlow<()> {
+        let Near { elements, solid, .. } = self.near;
+        let Some(grid) = elements.clear else { return ControlFlow::Continue(()) };
+        let place = solid.centre.into();
+        if let Some((leaf, number)) = grid.at(&elements.arrays, place).nearest() {
+            return self.compare(elements.arrays.leaves.points(leaf).start + number);
+        }
+        let Some(leaf) = grid.leaf(place) else { return ControlFlow::Continue(()) };
+        elements.arrays.tree.visit_leaf(level, leaf, self)
+    }
+
     /// Compares the shape with the part of a point.
     fn compare(&mut self, i: usize) -> ControlFlow<()> {
         let Near { elements, solid, .. } = self.near;

@@ -16,6 +16,7 @@ use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
 use crate::solid::meeting::verified_in;
+use crate::solid::probe::{Probed, probe};
 
 /// Discs at which a point of the surface in the shape is looked for.
 const TRIES: usize = 8;
@@ -28,9 +29,9 @@ struct Met {
     point: Vector3<f64>,
 }
 
-struct Touch<'s, 'a> {
-    near: Near<'s, 'a>,
-    detail: Detail,
+/// The parts that a shape was found to touch.
+#[derive(Debug, Clone, Copy)]
+struct Findings {
     /// The first discs that touch.
     met: [Option<Met>; TRIES],
     count: usize,
@@ -39,6 +40,11 @@ struct Touch<'s, 'a> {
     undersampled: bool,
     /// `true` if an enclosure is within the margin.
     doubtful: bool,
+}
+
+struct Touch<'s, 'a> {
+    near: Near<'s, 'a>,
+    found: Findings,
 }
 
 /// Decides whether `solid` touches the scan.
@@ -54,66 +60,34 @@ pub(crate) fn touch(
         verdict: ShapeVerdict::Separated { evidence },
         band: elements.greatest_band(),
     };
-    if let Some(grid) = elements.clear {
-        let centre = solid.centre.into();
-        if grid.clearance(centre) > elements.margin + solid.radius + solid.half.norm() {
-            return separated(elements.of_separation(false));
-        }
-    }
-    let detail = elements.detail;
+    let mut found = Findings::NONE;
+    let at = match probe(elements, solid, elements.certifies, |i| found.examine(elements, solid, i)) {
+        Probed::Clear => return separated(elements.of_separation(false)),
+        Probed::Ended => return found.answer(elements, solid, scratch),
+        Probed::Open(at) => at,
+    };
     let mut near = Near::new(elements, solid, elements.certifies);
     near.limit(elements.margin);
-    let (met, certified) = ([None; TRIES], None);
-    let mut search = Touch { near, detail, met, count: 0, certified, undersampled: false, doubtful: false };
+    let mut search = Touch { near, found: Findings::NONE };
     // An early end means that the question is settled.
-    if search.near_leaf(level).is_continue() {
-        let starts = elements.starts(solid, elements.margin);
-        if starts.is_empty() {
-            return separated(elements.of_separation(false));
-        }
-        let _settled = near.descend(level, &starts, &mut search);
-    }
-    let touching = |met: Met, point, evidence| ShapeAnswer {
-        verdict: ShapeVerdict::Touching { point, source: elements.placed.scan().id(met.i), evidence },
-        band: elements.band(met.i),
-    };
-    if let Some(met) = search.certified {
-        return touching(met, elements.in_world(&met.point), Evidence::Certified);
-    }
-    if let Some(first) = search.met[0] {
-        if detail == Detail::Witness {
-            for met in search.met.iter().flatten() {
-                if let Some(point) = verified_in(elements, solid, (met.i, met.point), scratch) {
-                    return touching(*met, point, Evidence::Certified);
-                }
-            }
-        }
-        return touching(first, elements.in_world(&first.point), Evidence::Estimated);
-    }
-    if search.undersampled {
-        let verdict = ShapeVerdict::Undecided(Reason::Undersampled);
-        return ShapeAnswer { verdict, band: elements.greatest_band() };
-    }
-    separated(elements.of_separation(search.doubtful))
+    let _settled = near.search(level, at, elements.margin, &mut search);
+    search.found.answer(elements, solid, scratch)
 }
 
-impl Touch<'_, '_> {
-    /// Compares the shape with the leaf that the grid names at its centre. Most shapes that touch are settled
-    /// by it.
-    #[inline]
-    fn near_leaf(&mut self, level: Level) -> ControlFlow<()> {
-        let Near { elements, solid, .. } = self.near;
-        let leaf = elements.clear.and_then(|grid| grid.leaf(solid.centre.into()));
-        let Some(leaf) = leaf else { return ControlFlow::Continue(()) };
-        elements.arrays.tree.visit_leaf(level, leaf, self)?;
-        // The leaf is visited again.
-        (self.met, self.count, self.doubtful) = ([None; TRIES], 0, false);
-        ControlFlow::Continue(())
+impl Findings {
+    const NONE: Self =
+        Self { met: [None; TRIES], count: 0, certified: None, undersampled: false, doubtful: false };
+
+    /// Compares the shape with the part of a point, and with the point itself.
+    fn examine(&mut self, elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> ControlFlow<()> {
+        if solid.is_box() {
+            self.hold(elements, solid, i)?;
+        }
+        self.compare(elements, solid, i)
     }
 
     /// Compares the shape with the part of a point.
-    fn compare(&mut self, i: usize) -> ControlFlow<()> {
-        let Near { elements, solid, .. } = self.near;
+    fn compare(&mut self, elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> ControlFlow<()> {
         let Some(point) = elements.reached(solid, i) else { return ControlFlow::Continue(()) };
         if elements.is_doubtful(i) {
             self.undersampled = true;
@@ -128,17 +102,43 @@ impl Touch<'_, '_> {
             self.met[self.count] = Some(met);
             self.count += 1;
         }
-        if self.detail == Detail::Verdict {
+        if elements.detail == Detail::Verdict {
             return ControlFlow::Break(());
         }
-        self.hold(i)
+        self.hold(elements, solid, i)
     }
 
     /// Ends the search if a measured point is in the shape: points are part of the obstacle.
-    fn hold(&mut self, i: usize) -> ControlFlow<()> {
-        let Near { elements, solid, .. } = self.near;
+    fn hold(&mut self, elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> ControlFlow<()> {
         self.certified = elements.held(solid, i).map(|point| Met { i, point });
         if self.certified.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    /// The answer, given all that was found.
+    fn answer(&self, elements: &Elements<'_>, solid: &Solid<'_>, scratch: &mut ViewScratch) -> ShapeAnswer {
+        let touching = |met: Met, point, evidence| ShapeAnswer {
+            verdict: ShapeVerdict::Touching { point, source: elements.placed.scan().id(met.i), evidence },
+            band: elements.band(met.i),
+        };
+        if let Some(met) = self.certified {
+            return touching(met, elements.in_world(&met.point), Evidence::Certified);
+        }
+        if let Some(first) = self.met[0] {
+            if elements.detail == Detail::Witness {
+                for met in self.met.iter().flatten() {
+                    if let Some(point) = verified_in(elements, solid, (met.i, met.point), scratch) {
+                        return touching(*met, point, Evidence::Certified);
+                    }
+                }
+            }
+            return touching(first, elements.in_world(&first.point), Evidence::Estimated);
+        }
+        let verdict = if self.undersampled {
+            ShapeVerdict::Undecided(Reason::Undersampled)
+        } else {
+            ShapeVerdict::Separated { evidence: elements.of_separation(self.doubtful) }
+        };
+        ShapeAnswer { verdict, band: elements.greatest_band() }
     }
 }
 
@@ -155,28 +155,30 @@ impl PlaceVisitor for Touch<'_, '_> {
 
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
-        let elements = self.near.elements;
+        let Self { near: Near { elements, solid, lane_box, most, .. }, found } = self;
+        let (solid, most) = (*solid, *most);
         if elements.certifies && elements.semantics == Semantics::Surface {
-            self.doubtful = true;
+            found.doubtful = true;
         }
         for (block, first, count) in elements.arrays.leaves.blocks(number) {
-            let gaps = elements.leaf_gaps(simd, &self.near.lane_box, (number, block, first, count));
-            if self.near.solid.is_box() {
-                let first_in = Bits(Elements::within(simd, (&gaps.points, count), self.near.most)).next();
-                first_in.map_or(ControlFlow::Continue(()), |lane| self.hold(first + lane))?;
+            let gaps = elements.leaf_gaps(simd, lane_box, (number, block, first, count));
+            if solid.is_box() {
+                let first_in = Bits(Elements::within(simd, (&gaps.points, count), most)).next();
+                first_in
+                    .map_or(ControlFlow::Continue(()), |lane| found.hold(elements, solid, first + lane))?;
             }
-            for lane in Bits(Elements::within(simd, (&gaps.elements, count), self.near.most)) {
-                self.compare(first + lane)?;
+            for lane in Bits(Elements::within(simd, (&gaps.elements, count), most)) {
+                found.compare(elements, solid, first + lane)?;
             }
             if elements.certifies
                 && elements.semantics == Semantics::Obstacle
-                && !self.doubtful
-                && self.count == 0
+                && !found.doubtful
+                && found.count == 0
             {
-                let within = elements.margin + self.near.solid.radius;
-                for lane in Bits(Elements::within(simd, (&gaps.cells, count), self.near.most)) {
-                    self.doubtful = !elements.is_cell_beyond(self.near.solid, first + lane, within);
-                    if self.doubtful {
+                let within = elements.margin + solid.radius;
+                for lane in Bits(Elements::within(simd, (&gaps.cells, count), most)) {
+                    found.doubtful = !elements.is_cell_beyond(solid, first + lane, within);
+                    if found.doubtful {
                         break;
                     }
                 }
