@@ -71,7 +71,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let count = number().unwrap_or(1000.0) as usize;
 
     let options = CollideOptions::estimated().with_detail(Detail::Verdict);
-    let scan = scan.with_shapes();
     let plan = ShapePlan::new(&options, &scan)?;
     let target = Target::new(scan.at(&Pose::IDENTITY), &plan);
     let (mut rng, mut scratch) = (rng(1), Scratch::default());

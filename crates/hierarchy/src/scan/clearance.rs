@@ -207,10 +207,11 @@ impl ClearanceGrid {
         self.page(scan, number, &mut Near::default())
     }
 
-    /// Returns what the grid of `scan` tells about a place. O(1).
+    /// Returns what the grid of `scan` tells about a place. The content of a block, which tells of distances
+    /// up to about three sampling radii, is left out for a greater `reach`. O(1).
     #[inline]
     #[must_use]
-    pub fn at(&self, scan: &ScanArrays<'_>, place: [f64; 3]) -> Clearance<'_> {
+    pub fn at(&self, scan: &ScanArrays<'_>, place: [f64; 3], reach: f64) -> Clearance<'_> {
         let [of_block, of_cube, of_place, of_list] = self.steps;
         let Some((block, within)) = self.blocks.locate(place) else {
             // The grid continues this far beyond the obstacle.
@@ -224,6 +225,9 @@ impl ClearanceGrid {
         let (edge, entry) = (self.blocks.edge(), self.entries[block]);
         if entry & COARSE != 0 {
             return Clearance::coarse(f64::from(entry & !COARSE) * of_block - edge * off(within));
+        }
+        if reach > of_cube * page::STEPS {
+            return Clearance::coarse(0.0);
         }
         let (cube, within) = in_part::<{ page::SIDE }>(within);
         let edge = edge / page::SIDE as f64;
@@ -456,7 +460,7 @@ mod tests {
             let nearest = (0..scan.radii.len())
                 .map(all)
                 .fold([f64::INFINITY; 2], |least, own| [least[0].min(own[0]), least[1].min(own[1])]);
-            let at = grid.at(scan, place);
+            let at = grid.at(scan, place, 0.0);
             for (told, exact) in [at.discs, at.obstacle].into_iter().zip(nearest) {
                 assert!(told <= exact + 1e-12, "{place:?} has {told}, not {exact}");
             }
@@ -530,11 +534,11 @@ mod tests {
         let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
         let grid = ClearanceGrid::new(&scan.arrays(), Level::new()).unwrap();
         for place in [[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0]] {
-            let at = grid.at(&scan.arrays(), place);
+            let at = grid.at(&scan.arrays(), place, 0.0);
             assert!(at.discs == f64::NEG_INFINITY && at.obstacle == f64::NEG_INFINITY);
             assert_eq!(grid.leaf(place), None);
         }
-        assert!(grid.at(&scan.arrays(), [1e300; 3]).obstacle > 0.0);
+        assert!(grid.at(&scan.arrays(), [1e300; 3], 0.0).obstacle > 0.0);
     }
 
     /// Pages that are made one after the other are those that are made at once.
@@ -550,7 +554,7 @@ mod tests {
         for i in 0..scan.len() {
             let place =
                 arrays.position(i).map(|c| f64::from(c) + rng.random_range(-1.0..1.0) * complete.edge());
-            let [a, b] = [&complete, &other].map(|grid| grid.at(&arrays, place));
+            let [a, b] = [&complete, &other].map(|grid| grid.at(&arrays, place, 0.0));
             assert_eq!((a.discs, a.obstacle, a.nearest()), (b.discs, b.obstacle, b.nearest()));
         }
     }

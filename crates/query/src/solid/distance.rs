@@ -72,7 +72,7 @@ impl Apart<'_, '_> {
         let Near { elements, solid, .. } = self.near;
         let Some(grid) = elements.clear else { return ControlFlow::Continue(()) };
         let place = solid.centre.into();
-        if let Some((leaf, number)) = grid.at(&elements.arrays, place).nearest() {
+        if let Some((leaf, number)) = grid.at(&elements.arrays, place, solid.radius).nearest() {
             return self.compare(elements.arrays.leaves.points(leaf).start + number);
         }
         let Some(leaf) = grid.leaf(place) else { return ControlFlow::Continue(()) };

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Clearance, ClearanceGrid};
 
 use crate::solid::core::Solid;
@@ -28,7 +29,8 @@ pub(crate) enum Probed<'a> {
 #[inline]
 pub(crate) fn is_far(elements: &Elements<'_>, solid: &Solid<'_>) -> bool {
     let within = elements.margin + solid.radius + solid.half.norm();
-    elements.clear.is_some_and(|grid| grid.at(&elements.arrays, solid.centre.into()).discs > within)
+    let told = elements.clear.map(|grid| grid.at(&elements.arrays, solid.centre.into(), within));
+    told.is_some_and(|at| at.discs > within)
 }
 
 /// Probes the grid at the centre of a shape and, if that does not decide, along the longest axis of its core.
@@ -51,7 +53,8 @@ pub(crate) fn probe<'a>(
         }
         _ => ControlFlow::Continue(()),
     };
-    let centre = grid.at(&elements.arrays, solid.centre.into());
+    let at = |place: Vector3<f64>| grid.at(&elements.arrays, place.into(), within);
+    let centre = at(solid.centre);
     if bound(&centre) > within + solid.half.norm() {
         return Probed::Clear;
     }
@@ -74,7 +77,7 @@ pub(crate) fn probe<'a>(
     for i in 1..count {
         #[expect(clippy::cast_precision_loss, reason = "a small number")]
         let steps = i.div_ceil(2) as f64 * if i % 2 == 0 { 2.0 * half } else { -2.0 * half };
-        let at = grid.at(&elements.arrays, (solid.centre + solid.axes[axis] * steps).into());
+        let at = at(solid.centre + solid.axes[axis] * steps);
         is_clear &= bound(&at) > cover;
         if named(&at, inner).is_break() {
             return Probed::Ended;
