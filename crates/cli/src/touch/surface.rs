@@ -99,7 +99,9 @@ pub(super) fn of_surface(
         let read = shapes.shape(line, &text, r);
         let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
         let shape = shape.shape();
-        let target = Target::new(index.placed(placed), &plan);
+        // An index is of no use for the surface alone.
+        let is_indexed = asked.semantics != Semantics::Surface;
+        let target = Target::new(if is_indexed { index.placed(placed) } else { *placed }, &plan);
         let report = answer(&target, &shape, &mut contacts, &mut scratch);
         let Some(mut report) = report else {
             return results.flush().and(Err(shapes.too_far(line)));

@@ -11,9 +11,12 @@ use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
 /// [`Placed::with_shapes`](crate::Placed::with_shapes).
 ///
 /// The index borrows nothing, so it can be stored beside its scan. Building it is O(n): about 20 ms and
-/// 4 MB for 100,000 points. The surroundings of a part of the surface are computed when a shape first comes
-/// there, in about 0.1 ms for a block of eight sampling radii, and kept: another 40 to 60 bytes a point once
-/// shapes have been everywhere. [`Self::complete`] computes all of them beforehand.
+/// 4 MB for 100,000 points.
+///
+/// The surroundings of a part of the surface are computed when a shape first comes there, in about 0.1 ms
+/// for a block of eight sampling radii (10 ms where points are much denser than elsewhere). They are kept:
+/// another 40 to 60 bytes a point once shapes have been everywhere. [`Self::complete`] computes all of them
+/// beforehand.
 #[derive(Debug, Clone)]
 pub struct ShapeIndex {
     /// The [identity](nearmiss_hierarchy::Outline) of the scan.

@@ -55,10 +55,11 @@ impl<'s, 'a> Near<'s, 'a> {
         within: f64,
         visitor: &mut V,
     ) -> ControlFlow<()> {
-        let solid = self.solid;
-        let most = within + solid.radius + solid.half.norm();
+        let (solid, most) = (self.solid, within + self.solid.radius);
+        // Leaves are listed about a place: about a longer core there would be others, and a worse proof.
+        let listed = at.filter(|_| solid.is_point());
         let listed =
-            at.and_then(|(grid, at)| grid.visit_near(level, (&at, solid.centre.into()), most, visitor));
+            listed.and_then(|(grid, at)| grid.visit_near(level, (&at, solid.centre.into()), most, visitor));
         listed.unwrap_or_else(|| self.descend(level, &self.elements.starts(solid, within), visitor))
     }
 

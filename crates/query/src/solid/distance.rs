@@ -17,6 +17,8 @@ use crate::solid::elements::Elements;
 /// The search for the nearest disc or ball, nearest node first.
 struct Apart<'s, 'a> {
     near: Near<'s, 'a>,
+    /// The greatest distance of interest.
+    within: f64,
     /// The least distance of the shape so far, and its point.
     upper: f64,
     best: Option<(usize, Gap)>,
@@ -36,12 +38,15 @@ pub(crate) fn distance(
     let scale = elements.scale();
     // Enclosures, because the nearest place of the obstacle may be outside the boxes.
     let near = Near::new(elements, solid, elements.certifies);
-    let mut search = Apart { near, upper: f64::INFINITY, best: None, lower: f64::INFINITY };
-    search.near.limit(within / scale);
+    let (most, none) = (within / scale, f64::INFINITY);
+    let mut search = Apart { near, within: most, upper: none, best: None, lower: none };
+    search.near.limit(most);
     // Ends early if they touch.
     if search.near_centre(level).is_continue() {
+        // The descent bounds what is near again, with the enclosures of nodes.
+        search.lower = none;
         let near = search.near;
-        let starts = elements.starts(solid, search.upper.min(within / scale));
+        let starts = elements.starts(solid, search.upper.min(most));
         let _touching = near.descend(level, &starts, &mut search);
     }
     let (i, gap) = search.best.filter(|_| search.upper * scale <= within)?;
@@ -90,7 +95,7 @@ impl Apart<'_, '_> {
         let distance = if distance <= thick { 0.0 } else { distance };
         if distance < self.upper {
             (self.upper, self.best) = (distance, Some((i, gap)));
-            self.near.limit(distance);
+            self.near.limit(distance.min(self.within));
         }
         if self.upper == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }

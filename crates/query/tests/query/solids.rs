@@ -375,7 +375,8 @@ fn an_index_changes_no_verdict() {
                         ShapeVerdict::Separated { evidence } => Some(evidence),
                         _ => None,
                     };
-                    let distance = target.distance(&shape, 2.0 * r, &mut scratch);
+                    let within = [2.0 * r, f64::INFINITY][round % 2];
+                    let distance = target.distance(&shape, within, &mut scratch);
                     target.contacts(&shape, &mut contacts, &mut scratch);
                     let depth = contacts.first().map(|contact| contact.depth);
                     (verdict.is_touching(), evidence, distance.map(|it| [it.lower, it.upper]), depth)

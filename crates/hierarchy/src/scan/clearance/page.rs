@@ -25,6 +25,10 @@ pub(crate) const CUBES: usize = SIDE * SIDE * SIDE;
 
 const VECTORS: usize = CUBES / WIDTH;
 
+/// The maximum number of leaves near a page. With more, which takes points that are a hundred times denser
+/// there than elsewhere, nothing is computed, and the cubes tell nothing.
+const MOST_LEAVES_NEAR: usize = 2048;
+
 /// Codes of cubes below this are numbers of bricks. The others are clearances.
 const BRICKS: u8 = 64;
 
@@ -129,8 +133,9 @@ impl Near {
         let within = half + reach.most.max(reach.in_brick + reach.edge as f32) + 2.0 * reach.lost;
         self.leaves.clear();
         let mut search = Collect { tree: &scan.tree, most_sq: within * within, found: &mut self.leaves };
-        // Never ends early.
-        let _whole = scan.tree.descend_to_by(simd, middle, &mut search);
+        if scan.tree.descend_to_by(simd, middle, &mut search).is_break() {
+            return Page { codes: [BRICKS; CUBES], distances: Vec::new(), neighbours: Vec::new() };
+        }
         let mut centres = [[[0.0; WIDTH]; 3]; VECTORS];
         for cube in 0..CUBES {
             let centre = centre(corner, reach.edge, cube);
@@ -221,7 +226,7 @@ fn centre(corner: [f64; 3], edge: f64, cube: usize) -> [f64; 3] {
     [0, 1, 2].map(|k| corner[k] + edge * (steps[k] as f64 + 0.5))
 }
 
-/// The search for all leaves within a distance of a place.
+/// The search for all leaves within a distance of a place. Ends early if there are too many.
 struct Collect<'s, 'a> {
     tree: &'s Tree<'a>,
     most_sq: f32,
@@ -244,6 +249,6 @@ impl PlaceVisitor for Collect<'_, '_> {
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
         self.found.push(id32(number));
-        ControlFlow::Continue(())
+        if self.found.len() > MOST_LEAVES_NEAR { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
