@@ -1,11 +1,10 @@
 //! `touch`: tests many shapes against a scan, by its points or by its surface.
 
 mod args;
-mod index;
 mod shapes;
 mod surface;
 
-use nearmiss::{NearestPoint, Placed, Shape};
+use nearmiss::{NearestPoint, Placed, Scan, Shape, ShapeIndex};
 use serde::Serialize;
 
 use crate::console::{Console, Results, now};
@@ -14,7 +13,6 @@ use crate::error::CliError;
 use crate::input::Opening;
 use crate::posing;
 pub use crate::touch::args::TouchArgs;
-use crate::touch::index::LaterIndex;
 use crate::touch::shapes::ShapeFile;
 use crate::touch::surface::{Asked, of_surface};
 
@@ -41,18 +39,29 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     let r = scan.sampling_radius() * pose.scale();
     match asked {
         Some(asked) => of_surface(&scan.at(&pose), asked, &mut shapes, (r, args.json)),
-        None => of_points(&scan.at(&pose), &mut shapes, (r, args.json)),
+        None => of_points(&scan, &scan.at(&pose), &mut shapes, (r, args.json)),
     }
 }
 
 /// Tests shapes against the points of a scan.
-fn of_points(placed: &Placed<'_>, shapes: &mut ShapeFile, (r, is_json): (f64, bool)) -> Result<(), CliError> {
-    let (mut index, mut results) = (LaterIndex::default(), Results::new());
+fn of_points(
+    scan: &Scan,
+    placed: &Placed<'_>,
+    shapes: &mut ShapeFile,
+    (r, is_json): (f64, bool),
+) -> Result<(), CliError> {
+    let mut index = None;
+    let mut results = Results::new();
+    let mut asked = 0;
     while let Some((line, text)) = shapes.next_line()? {
         // Answers to the lines before a faulty one are written before the error.
         let read = shapes.shape(line, &text, r);
         let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
-        let placed = index.placed(placed);
+        asked += 1;
+        if asked == MANY {
+            index = Some(ShapeIndex::new(scan));
+        }
+        let placed = index.as_ref().map_or(*placed, |index| placed.with_shapes(index));
         let (touches, nearest, micros) = answer(&placed, &shape.shape());
         let Some(nearest) = nearest else {
             return Err(shapes.too_far(line));
@@ -66,6 +75,9 @@ fn of_points(placed: &Placed<'_>, shapes: &mut ShapeFile, (r, is_json): (f64, bo
     }
     results.flush()
 }
+
+/// The least number of shapes for which an index pays off.
+const MANY: u32 = 256;
 
 fn answer(placed: &Placed<'_>, shape: &Shape<'_>) -> (bool, Option<NearestPoint>, f64) {
     let start = now();

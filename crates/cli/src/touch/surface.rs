@@ -14,7 +14,6 @@ use crate::error::CliError;
 use crate::evidence::word;
 use crate::penetration::{PenetrationReport, penetration_sentence};
 use crate::touch::args::TouchArgs;
-use crate::touch::index::LaterIndex;
 use crate::touch::shapes::ShapeFile;
 
 /// The question about each shape.
@@ -93,15 +92,12 @@ pub(super) fn of_surface(
 ) -> Result<(), CliError> {
     let options = CollideOptions::default().with_semantics(asked.semantics).with_margin(asked.margin);
     let plan = ShapePlan::new(&options, placed.scan())?;
+    let target = Target::new(*placed, &plan);
     let (mut scratch, mut contacts, mut results) = (Scratch::default(), Vec::new(), Results::new());
-    let mut index = LaterIndex::default();
     while let Some((line, text)) = shapes.next_line()? {
         let read = shapes.shape(line, &text, r);
         let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
         let shape = shape.shape();
-        // An index is of no use for the surface alone.
-        let is_indexed = asked.semantics != Semantics::Surface;
-        let target = Target::new(if is_indexed { index.placed(placed) } else { *placed }, &plan);
         let report = answer(&target, &shape, &mut contacts, &mut scratch);
         let Some(mut report) = report else {
             return results.flush().and(Err(shapes.too_far(line)));

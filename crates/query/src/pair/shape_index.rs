@@ -17,6 +17,10 @@ use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
 /// for a block of eight sampling radii (10 ms where points are much denser than elsewhere). They are kept:
 /// another 40 to 60 bytes a point once shapes have been everywhere. [`Self::complete`] computes all of them
 /// beforehand.
+///
+/// Against points, an index pays off from some hundred shapes on. Against the surface of 100,000 points it
+/// takes about half a million touches of small shapes all over the scan, or 200,000 distances: it is for
+/// simulations and planners. Without an index a sphere takes about 0.6 µs.
 #[derive(Debug, Clone)]
 pub struct ShapeIndex {
     /// The [identity](nearmiss_hierarchy::Outline) of the scan.
