@@ -19,6 +19,7 @@ use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
 use crate::output;
 use crate::parse::parse_radius;
+use crate::penetration::{SolidName, interiors};
 use crate::posing::{self, PairArgs};
 use crate::preprocess::parse_threads;
 use list::List;
@@ -46,6 +47,18 @@ pub struct ClashArgs {
     /// The default is four times the larger sampling radius.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true, value_parser = parse_radius)]
     pub link: Option<f64>,
+    /// Measure how deep each hard clash is: how far B must move so that the scans do not meet there
+    ///
+    /// This takes a few milliseconds for each clash, or seconds for large ones. Name scans with a closed
+    /// surface by --solid.
+    #[arg(long)]
+    pub depth: bool,
+    /// Scans whose closed surface encloses a solid, for --depth
+    ///
+    /// What is inside a solid overlaps it. Other scans are surfaces without inside, such as rooms: the way out
+    /// of these may lead to either side.
+    #[arg(long, value_enum, value_name = "WHICH", requires = "depth", conflicts_with = "thickened")]
+    pub solid: Option<SolidName>,
     /// Write the list as a table for spreadsheets, one line for each clash
     #[arg(long, value_name = "OUT.csv")]
     pub csv: Option<PathBuf>,
@@ -108,6 +121,7 @@ pub(crate) fn options(args: &ClashArgs, a: &Scan) -> ClashOptions {
     let mut options =
         ClashOptions::default().with_semantics(args.meaning.semantics(a)).with_clearance(args.clearance);
     options.link = args.link;
+    options.depths = args.depth.then(|| interiors(args.solid));
     options
 }
 

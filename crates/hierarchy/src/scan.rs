@@ -20,6 +20,7 @@ pub(crate) mod options;
 pub(crate) mod ordered;
 pub(crate) mod organised;
 pub(crate) mod outline;
+mod part;
 pub(crate) mod points;
 pub(crate) mod prepare;
 pub(crate) mod refit;

@@ -12,8 +12,12 @@
 //! A near contact is the first one found for two leaves, not the nearest. The distance of a
 //! clearance clash is therefore bounded from above by the nearest points of the same leaves. It is
 //! bounded from below by the enclosures of these leaves, or by the balls about their points.
+//!
+//! The depth of a hard clash is the penetration of the parts of both scans around it. The parts grow until
+//! the shift that separates them is short against them, so that what was left out does not matter.
 
 mod components;
+mod depth;
 mod group;
 mod least;
 mod measure;
@@ -30,6 +34,7 @@ pub use group::ContactGroup;
 use crate::ask::answer::{Answer, Contact, Contacts, Evidence};
 use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
 use crate::pair::placed::Placed;
+use crate::penetration::answer::{Interior, Penetration};
 use crate::question::{Pair, Scratch};
 use measure::{NearContacts, Nearness, nearness};
 use stored::{leaves, stored};
@@ -49,6 +54,8 @@ pub struct ClashOptions {
     /// The distances that define the surfaces. Default: `None`, those that both scans were prepared
     /// for.
     pub metric: Option<Metric>,
+    /// The insides of both scans, if the depths of hard clashes are wanted. Default: `None`.
+    pub depths: Option<[Interior; 2]>,
 }
 
 impl ClashOptions {
@@ -75,6 +82,12 @@ impl ClashOptions {
     pub const fn with_metric(self, metric: Metric) -> Self {
         Self { metric: Some(metric), ..self }
     }
+
+    /// Returns the options that ask for the depths of hard clashes, given the insides of both scans.
+    #[must_use]
+    pub const fn with_depths(self, interiors: [Interior; 2]) -> Self {
+        Self { depths: Some(interiors), ..self }
+    }
 }
 
 /// Validated options for two scans, in any poses.
@@ -84,6 +97,7 @@ pub struct ClashPlan {
     /// The search within the clearance, if that is above zero.
     near: Option<CollidePlan>,
     link: Option<f64>,
+    depths: Option<[Interior; 2]>,
 }
 
 /// The default link length, in sampling radii of the coarser scan. A leaf of sixteen points is
@@ -109,7 +123,7 @@ impl ClashPlan {
             .with_evidence(Evidence::Estimated);
         let touching = CollidePlan::new(&asked, a, b)?;
         let near = CollidePlan::new(&asked.with_margin(options.clearance), a, b)?;
-        Ok(Self { touching, near: (options.clearance > 0.0).then_some(near), link: options.link })
+        Ok(Self { touching, near: (options.clearance > 0.0).then_some(near), link: options.link, depths: options.depths })
     }
 
     /// The validated options of the search for contact.
@@ -167,8 +181,9 @@ pub struct Clash {
     /// The evidence for [`Self::upper`]. Certified: two measured points, or the balls about them,
     /// are that near. Estimated: tangent discs are.
     pub evidence: Evidence,
-    /// The penetration depth. Always `None`: no search computes it yet.
-    pub depth: Option<f64>,
+    /// How far, and in which direction, to shift b so that the scans do not meet around the clash: see
+    /// [`Pair::depths`]. `None` in a clearance clash, and if the options do not ask for it.
+    pub depth: Option<Penetration>,
 }
 
 /// All clashes of two scans.
@@ -200,12 +215,16 @@ const GROUPED: f64 = 0.98;
 /// The progress of a list without a clearance after the search for contact.
 const TOUCHING_ALONE: f64 = 0.9;
 
+/// The progress before depths are measured, which take most of the time.
+const LISTED: f64 = 0.1;
+
 impl Pair<'_> {
     /// Lists every place where the scans meet or, with a clearance, come nearer than it.
     ///
     /// Costs two searches for [all contacts](Self::contacts), and n log n steps to group n
-    /// contacts. If the clearance is large, the second search takes most of the time. Each search
-    /// may spend the whole budget. Allocates. Deterministic unless the budget has a deadline.
+    /// contacts. If the clearance is large, the second search takes most of the time;
+    /// [depths](Self::depths) take longer. Each search may spend the whole budget. Allocates. Deterministic
+    /// unless the budget has a deadline.
     #[must_use]
     pub fn clashes(&self, plan: &ClashPlan, scratch: &mut Scratch) -> Clashes {
         self.clashes_watched(plan, scratch, &mut |_| ())
@@ -220,6 +239,22 @@ impl Pair<'_> {
         scratch: &mut Scratch,
         told: &mut dyn FnMut(f64),
     ) -> Clashes {
+        let Some(interiors) = plan.depths else { return self.list(plan, scratch, told) };
+        let mut found = self.list(plan, scratch, &mut |share| told(LISTED * share));
+        let hard: Vec<&mut Clash> =
+            found.clashes.iter_mut().filter(|clash| clash.kind == ClashKind::Hard).collect();
+        let groups: Vec<&ContactGroup> = hard.iter().map(|clash| &clash.group).collect();
+        let mut told = |share| told(LISTED + (1.0 - LISTED) * share);
+        let asked = (found.contacts.as_slice(), groups.as_slice());
+        let depths = self.depths(asked, (&plan.touching, interiors), scratch, &mut told);
+        for (clash, depth) in hard.into_iter().zip(depths) {
+            clash.depth = Some(depth);
+        }
+        found
+    }
+
+    /// Lists the clashes without depths.
+    fn list(&self, plan: &ClashPlan, scratch: &mut Scratch, told: &mut dyn FnMut(f64)) -> Clashes {
         let views = self.scans().each_ref();
         let link = plan.link(views);
         let mut hard = Contacts::default();

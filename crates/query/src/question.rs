@@ -132,7 +132,7 @@ impl Placed<'_> {
 #[derive(Debug, Clone, Copy)]
 pub struct Pair<'a> {
     scans: [Placed<'a>; 2],
-    budget: Budget,
+    pub(crate) budget: Budget,
 }
 
 impl<'a> Pair<'a> {

@@ -101,7 +101,8 @@ fn table(list: &List<'_>, pictured: usize, out: &mut impl Write) -> io::Result<(
         write!(out, "<tr><td data-v=\"{}\">{number}</td>", clash.id)?;
         write!(out, "<td><span class=\"{kind}\"></span>{kind}</td>")?;
         write!(out, "<td data-v=\"{x}\">{centre}</td><td data-v=\"{diagonal}\">{size}</td>")?;
-        write!(out, "<td data-v=\"{}\">{distance}</td>", clash.upper)?;
+        let apart = clash.depth.map_or(clash.upper, |depth| -depth);
+        write!(out, "<td data-v=\"{apart}\">{distance}</td>")?;
         writeln!(out, "<td data-v=\"{}\">{contacts}</td></tr>", clash.contacts)?;
     }
     writeln!(out, "</tbody>\n</table>")
@@ -121,7 +122,11 @@ fn figures(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) -> io::Re
         let [id, kind, centre, size, distance, _] = cells(list, &clash).map(|cell| escaped(&cell));
         writeln!(out, "<figure id=\"clash-{id}\">")?;
         image(picture, &format!("close view of clash {id}"), out)?;
-        let distance = if kind == "hard" { String::new() } else { format!(", distance {distance}") };
+        let distance = match (clash.kind, clash.depth) {
+            ("hard", None) => String::new(),
+            ("hard", Some(_)) => format!(", {distance}"),
+            _ => format!(", distance {distance}"),
+        };
         writeln!(
             out,
             "<figcaption><strong>{id}</strong> <span class=\"{kind}\"></span>{kind}{distance}; size {size}, around \

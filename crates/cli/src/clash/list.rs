@@ -48,8 +48,11 @@ pub(crate) struct ClashReport {
     pub(crate) contacts: usize,
     /// The number of near contacts around a hard clash.
     pub(crate) surroundings: usize,
-    /// The penetration depth. Always null: no search computes it yet.
+    /// How far b must move out of a hard clash, at least and at most, and in which direction. Null unless asked
+    /// for.
     pub(crate) depth: Option<f64>,
+    pub(crate) depth_lower: Option<f64>,
+    pub(crate) depth_direction: Option<[f64; 3]>,
     /// The place of the contact with the least residual.
     pub(crate) point: [f64; 3],
     residual: f64,
@@ -60,6 +63,7 @@ pub(crate) struct ClashReport {
 impl ClashReport {
     fn new(id: usize, clash: &Clash, contacts: &[Contact]) -> Self {
         let nearest = &contacts[clash.group.nearest];
+        let depth = clash.depth.filter(|depth| depth.upper.is_finite());
         Self {
             id,
             kind: kind_word(clash.kind),
@@ -71,7 +75,9 @@ impl ClashReport {
             evidence: word(clash.evidence),
             contacts: clash.group.contacts.len(),
             surroundings: clash.surroundings.len(),
-            depth: clash.depth,
+            depth: depth.map(|depth| depth.upper),
+            depth_lower: depth.map(|depth| depth.lower),
+            depth_direction: depth.map(|depth| depth.direction),
             point: nearest.point,
             residual: nearest.residual,
             source_a: nearest.sources[0].0,

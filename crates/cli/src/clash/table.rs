@@ -71,15 +71,19 @@ pub(crate) fn write_csv(list: &List<'_>, out: &mut impl Write) -> io::Result<()>
     writeln!(
         out,
         "id,kind,centre_x,centre_y,centre_z,size_x,size_y,size_z,distance_lower,distance_upper,evidence,contacts,\
-         surroundings,depth,point_x,point_y,point_z,source_a,source_b,a,b"
+         surroundings,depth,point_x,point_y,point_z,source_a,source_b,a,b,depth_lower,depth_direction_x,\
+         depth_direction_y,depth_direction_z"
     )?;
     for clash in list.reports() {
         let ([cx, cy, cz], [sx, sy, sz], [px, py, pz]) = (clash.centre, clash.size, clash.point);
-        let depth = clash.depth.map_or_else(String::new, |depth| depth.to_string());
+        let number = |length: Option<f64>| length.map_or_else(String::new, |length| length.to_string());
+        let (depth, lower) = (number(clash.depth), number(clash.depth_lower));
+        let [dx, dy, dz] = [0, 1, 2].map(|k| number(clash.depth_direction.map(|direction| direction[k])));
         write!(out, "{},{},{cx},{cy},{cz},{sx},{sy},{sz},", clash.id, clash.kind)?;
         write!(out, "{},{},{},{},", clash.lower, clash.upper, clash.evidence, clash.contacts)?;
         let (source_a, source_b) = (clash.source_a, clash.source_b);
-        writeln!(out, "{},{depth},{px},{py},{pz},{source_a},{source_b},{a},{b}", clash.surroundings)?;
+        write!(out, "{},{depth},{px},{py},{pz},{source_a},{source_b},{a},{b}", clash.surroundings)?;
+        writeln!(out, ",{lower},{dx},{dy},{dz}")?;
     }
     Ok(())
 }
@@ -129,11 +133,12 @@ pub(crate) fn cells(list: &List<'_>, clash: &ClashReport) -> [String; 6] {
     ]
 }
 
-/// Returns the distance of a clash in words, with the lower bound rounded down.
+/// Returns the distance or the depth of a clash in words, with the lower bound rounded down.
 fn distance(list: &List<'_>, clash: &ClashReport) -> String {
     let upper = short(clash.upper);
-    match clash.kind {
-        "hard" => "contact".to_owned(),
+    match (clash.kind, clash.depth) {
+        ("hard", Some(depth)) => format!("{} deep", short(depth)),
+        ("hard", None) => "contact".to_owned(),
         _ if clash.lower.to_bits() == clash.upper.to_bits() => upper,
         _ if clash.lower > 0.0 => format!("{} to {upper}", rounded_down(clash.lower, list.unit())),
         _ => format!("up to {upper}"),

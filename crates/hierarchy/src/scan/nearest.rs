@@ -205,7 +205,7 @@ impl PointHierarchy {
     }
 
     /// Returns an upper bound of the stored coordinates.
-    fn bounds_radius(&self) -> f64 {
+    pub(crate) fn bounds_radius(&self) -> f64 {
         let bounds = self.meta.root.bounds;
         let OrientedBox { centre, .. } = bounds;
         f64::from(bounds.radius()) + f64::from(centre.iter().fold(0.0_f32, |far, c| far.max(c.abs())))

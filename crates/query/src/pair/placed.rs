@@ -46,6 +46,11 @@ impl<'a> Placed<'a> {
         Self { stored_to_world: Self::new(self.scan, pose).stored_to_world, ..*self }
     }
 
+    /// A [part](PointHierarchy::part) of the scan, placed as the scan is.
+    pub(crate) fn with_part<'p>(&self, part: &'p PointHierarchy) -> Placed<'p> {
+        Placed { scan: part, graph: None, shapes: None, stored_to_world: self.stored_to_world }
+    }
+
     /// The same placed scan, shifted by `t` in the world.
     pub(crate) fn shifted(&self, t: [f64; 3]) -> Self {
         let pose = &self.stored_to_world;

@@ -134,11 +134,12 @@ pub(crate) fn world_axes(elements: &Elements<'_>) -> [Vector; 3] {
     elements.arrays.tree.root_box().axes.map(|axis| frame.rotate(axis.map(f64::from)).into())
 }
 
+/// The number of points of a scan that are tested.
+pub(crate) const TESTED: usize = 16;
+
 /// Some points of a scan, spread over it, in the world.
-pub(crate) fn some_points(placed: Placed<'_>) -> impl Iterator<Item = Vector> {
-    /// The number of these points.
-    const PARTS: usize = 16;
-    (0..PARTS).map(move |n| placed.point(placed.scan().len() * n / PARTS).into())
+pub(crate) fn some_points(placed: &Placed<'_>) -> [Vector; TESTED] {
+    std::array::from_fn(|n| placed.point(placed.scan().len() * n / TESTED).into())
 }
 
 /// The same as [`nearest_point`] with all places and lengths in the world.

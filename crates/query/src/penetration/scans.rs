@@ -11,7 +11,7 @@ use crate::pair::placed_balls::is_proper;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{
-    contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
+    TESTED, contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
 };
 use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
 use crate::penetration::search::search;
@@ -27,10 +27,13 @@ pub(crate) struct PenetrationScratch {
     pub(crate) contacts: Contacts,
 }
 
-/// Two placed scans, and the cost of all tests so far. Shifts are those of b, in the world.
+/// Two placed scans, or parts of them, and the cost of all tests so far. Shifts are those of b, in the world.
 struct ScanProbe<'s> {
     scans: [Placed<'s>; 2],
     elements: [Elements<'s>; 2],
+    /// The whole scans, whose surfaces enclose the solids.
+    wholes: [Elements<'s>; 2],
+    points: [[Vector; TESTED]; 2],
     /// `true` for scans whose inside counts.
     solid: [bool; 2],
     plan: CollidePlan,
@@ -41,6 +44,22 @@ struct ScanProbe<'s> {
     spent: Statistics,
 }
 
+/// A scan or a part of one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece<'s> {
+    pub(crate) part: Placed<'s>,
+    /// The whole scan, whose surface encloses the solid.
+    pub(crate) whole: Placed<'s>,
+    /// Points of the part. Where surfaces do not meet, they tell whether the part is inside another scan.
+    pub(crate) points: [Vector; TESTED],
+}
+
+impl<'s> Piece<'s> {
+    fn whole(scan: &Placed<'s>) -> Self {
+        Self { part: *scan, whole: *scan, points: some_points(scan) }
+    }
+}
+
 /// Bounds the penetration of two scans.
 pub(crate) fn penetration<'s>(
     scans: [&Placed<'s>; 2],
@@ -49,17 +68,31 @@ pub(crate) fn penetration<'s>(
     (contact, crossings): (&'s mut ContactScratch, &'s mut Vec<Crossing>),
     scratch: &'s mut PenetrationScratch,
 ) -> Penetration {
-    let scans = scans.map(|scan| *scan);
+    of_pieces(scans.map(Piece::whole), (plan, interiors), budget, (contact, crossings), scratch)
+}
+
+/// Bounds the penetration of two scans or parts of scans.
+pub(crate) fn of_pieces<'s>(
+    pieces: [Piece<'s>; 2],
+    (plan, interiors): (&CollidePlan, [Interior; 2]),
+    budget: &Budget,
+    (contact, crossings): (&'s mut ContactScratch, &'s mut Vec<Crossing>),
+    scratch: &'s mut PenetrationScratch,
+) -> Penetration {
+    let scans = pieces.map(|piece| piece.part);
     if !scans.iter().all(|scan| is_proper(scan.stored_to_world())) {
         return Penetration::UNKNOWN;
     }
     let of_shapes = ShapePlan::of_pair(plan.options());
     let elements = scans.map(|scan| Elements::new(scan, &of_shapes));
+    let wholes = pieces.map(|piece| Elements::new(piece.whole, &of_shapes));
     let solid = [0, 1].map(|k: usize| counts(&elements[k], interiors[k]));
     let PenetrationScratch { survey, contacts } = scratch;
     let mut probe = ScanProbe {
         scans,
         elements,
+        wholes,
+        points: pieces.map(|piece| piece.points),
         solid,
         plan: plan.of_verdicts(),
         budget: Budget { resolution: None, ..*budget },
@@ -119,10 +152,10 @@ impl ScanProbe<'_> {
     /// If the surfaces do not meet, each part of a scan is inside or outside as a whole.
     fn has_part_inside(&mut self, k: usize, t: Vector) -> bool {
         let shift = if k == 0 { t } else { -t };
-        some_points(self.scans[1 - k]).any(|place| {
+        self.points[1 - k].iter().any(|place| {
             self.spent.evaluations += 1;
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
-            contains(&self.elements[k], &(place + shift), working)
+            contains(&self.wholes[k], &(place + shift), working)
         })
     }
 
@@ -142,7 +175,7 @@ impl ScanProbe<'_> {
         }
         for k in (0..2).filter(|&k| solid[k]) {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
-            let (depth, uphill) = world_depth_in(&self.elements[k], &found.place, working)?;
+            let (depth, uphill) = world_depth_in(&self.wholes[k], &found.place, working)?;
             found.depth += depth;
             found.uphill += uphill;
         }

@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Clash, ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions, CollidePlan, Contact, ContactGroup,
-    Contacts, Detail, Pair, Placed, PlanError, Scratch, Semantics,
+    Budget, Clash, ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions, CollidePlan, Contact,
+    ContactGroup, Contacts, Detail, Interior, Pair, Penetration, Placed, PlanError, Scratch, Semantics,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle;
+use nearmiss_testdata::shapes::{Form, Order, Sampling, cuboid, patch, sphere};
 
 fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     let leaf = BuildOptions::default().with_leaf_size(8);
@@ -212,4 +213,107 @@ fn scans_that_are_apart_have_no_clash_and_bad_lengths_are_refused() {
         let of_clearance = ClashPlan::new(&ClashOptions::default().with_clearance(bad), &floor, &floor);
         assert!(matches!(of_clearance, Err(PlanError::Margin(_))), "{bad}");
     }
+}
+
+/// Returns points of forms, each placed at a pose.
+fn scene(forms: &[(Form, Pose)], spacing: f64) -> PointHierarchy {
+    let sampling = Sampling { spacing, noise: 0.0, order: Order::Random, seed: 4 };
+    let points: Vec<[f64; 3]> = forms
+        .iter()
+        .flat_map(|(form, pose)| {
+            let points = form.clone().sample(sampling).points;
+            points.into_iter().map(|p| pose.apply(p)).collect::<Vec<_>>()
+        })
+        .collect();
+    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+/// Returns the depths of the hard clashes in the order of their centres along x.
+fn depths(found: &Clashes) -> Vec<(f64, Penetration)> {
+    let of = |clash: &&Clash| (clash.group.centre()[0], clash.depth.unwrap());
+    let mut all: Vec<_> = of_kind(found, ClashKind::Hard).iter().map(of).collect();
+    all.sort_by(|p, q| p.0.total_cmp(&q.0));
+    all
+}
+
+#[test]
+fn each_clash_has_the_depth_of_its_own_place() {
+    const SPACING: f64 = 0.03;
+    const HOLLOW: Interior = Interior::Hollow;
+    const SOLID: Interior = Interior::Solid;
+    let rows = [0.02, 0.05, 0.1, 0.15, 0.25, 0.3];
+    let floor = scene(&[(patch(7.0, 2.0), Pose::IDENTITY)], SPACING);
+    // Balls of radius 0.3, sunk to these depths. The way out of a floor is up or down.
+    let balls: Vec<(Form, Pose)> = (0_u32..)
+        .zip(rows)
+        .map(|(i, depth)| (sphere(0.3), Pose::from_translation([f64::from(i) - 2.5, 0.0, 0.3 - depth])))
+        .collect();
+    let balls = scene(&balls, SPACING);
+    let radius = balls.sampling_radius().max(floor.sampling_radius());
+    for (turn, scale) in [(0.0, 1.0), (0.7, 20.0)] {
+        let frame = Pose::from_axis_angle([0.0, 0.0, turn], turn).with_scale(scale);
+        let (a, b) = (Placed::new(&floor, &frame), Placed::new(&balls, &frame));
+        let told = depths(&list(&a, &b, &ClashOptions::default().with_depths([HOLLOW; 2])));
+        assert_eq!(told.len(), rows.len(), "{told:?}");
+        for ((_, found), depth) in told.iter().zip(rows) {
+            assert!((found.upper / scale - depth).abs() < radius, "{depth}: {found:?}");
+            assert!(found.direction.map(f64::abs)[2] > 0.8, "{depth}: {found:?}");
+        }
+        // As surfaces of solids, the balls have lower bounds.
+        let told = depths(&list(&a, &b, &ClashOptions::default().with_depths([HOLLOW, SOLID])));
+        for ((_, found), depth) in told.iter().zip(rows) {
+            assert!(found.lower / scale > depth - radius && found.lower <= found.upper, "{depth}: {found:?}");
+            assert!((found.upper / scale - depth).abs() < radius, "{depth}: {found:?}");
+        }
+        // No group needs more than all together.
+        let plan = CollidePlan::new(&CollideOptions::estimated(), &floor, &balls).unwrap();
+        let whole = Pair::new(a, b).penetration(&plan, [HOLLOW; 2], &mut Scratch::default());
+        assert!(told.iter().all(|(_, found)| found.upper <= whole.upper * 1.001), "{whole:?}");
+    }
+
+    // Balls of radius 0.2 in the top of a block. Most of the third is below: it is pulled out of a solid, and
+    // pushed into a shell.
+    let block = scene(&[(cuboid([3.0, 1.0, 1.0]), Pose::IDENTITY)], SPACING);
+    let top = block.bounds().max[2];
+    let sunk = [0.05, 0.15, 0.3];
+    let balls: Vec<(Form, Pose)> = (-1_i32..)
+        .zip(sunk)
+        .map(|(i, depth)| (sphere(0.2), Pose::from_translation([0.8 * f64::from(i), 0.0, top + 0.2 - depth])))
+        .collect();
+    let balls = scene(&balls, SPACING);
+    let (a, b) = (Placed::new(&block, &Pose::IDENTITY), Placed::new(&balls, &Pose::IDENTITY));
+    for (interiors, last) in [([SOLID; 2], 0.3), ([HOLLOW; 2], 0.1)] {
+        let told = depths(&list(&a, &b, &ClashOptions::default().with_depths(interiors)));
+        for ((_, found), depth) in told.iter().zip([sunk[0], sunk[1], last]) {
+            assert!((found.upper - depth).abs() < radius, "{interiors:?} {depth}: {found:?}");
+            let lower = if interiors[0] == SOLID { depth - 1.5 * radius } else { 0.0 };
+            assert!(found.lower >= lower && found.lower <= depth + radius, "{interiors:?} {depth}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn depths_of_a_pipe_and_of_clearance_clashes() {
+    // A pipe passes through a wall, and another one ends before it.
+    let wall = scene(&[(patch(2.0, 2.0), Pose::IDENTITY)], 0.03);
+    let pipes = [
+        (cuboid([0.2, 0.2, 1.6]), Pose::from_translation([-0.5, 0.0, 0.1])),
+        (cuboid([0.2, 0.2, 1.6]), Pose::from_translation([0.5, 0.0, 0.85])),
+    ];
+    let pipes = scene(&pipes, 0.03);
+    let (a, b) = (Placed::new(&wall, &Pose::IDENTITY), Placed::new(&pipes, &Pose::IDENTITY));
+    let options = ClashOptions::default().with_clearance(0.1).with_depths([Interior::Hollow; 2]);
+    let found = list(&a, &b, &options);
+    let [hard] = of_kind(&found, ClashKind::Hard)[..] else { panic!("{:?}", found.clashes) };
+    let [near] = of_kind(&found, ClashKind::Clearance)[..] else { panic!("{:?}", found.clashes) };
+    assert_eq!(near.depth, None);
+    // It leaves sideways over the border of the wall, 0.6 away, sooner than along its axis.
+    let depth = hard.depth.unwrap();
+    assert!((depth.upper - 0.6).abs() < 0.04 && depth.direction[0] < -0.99, "{depth:?}");
+    // A small budget still gives a shift that separates.
+    let plan = ClashPlan::new(&options, &wall, &pipes).unwrap();
+    let budget = Budget::UNLIMITED.with_work(200);
+    let hasty = Pair::new(a, b).within(&budget).clashes(&plan, &mut Scratch::default());
+    let depth = of_kind(&hasty, ClashKind::Hard)[0].depth;
+    assert!(depth.is_none_or(|depth| depth.upper >= 0.5), "{depth:?}");
 }
