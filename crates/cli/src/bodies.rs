@@ -1,9 +1,9 @@
 //! The two things that `collide` and `distance` compare: two scans, or a scan and a mesh.
 
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, Contact, Contacts, Distance, DistanceOptions, DistancePlan,
-    Interior, ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, MeshSolid, Pair, Penetration, Placed,
-    PlacedMesh, PlanError, Pose, Proof, Scan, Scratch, Semantics,
+    Answer, Budget, CollideOptions, CollidePlan, Contact, ContactGroup, Contacts, Distance, DistanceOptions,
+    DistancePlan, Interior, ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, MeshSolid, Pair, Penetration,
+    Placed, PlacedMesh, PlanError, Pose, Proof, Scan, Scratch, Semantics,
 };
 
 use crate::contacts::{ContactArgs, Grouped};
@@ -264,6 +264,23 @@ impl<'a> Views<'a> {
             Self::Scans([a, b]) => args.group(contacts, [a, b]),
             Self::MeshAndScan { scan, .. } => args.group(contacts, [scan; 2]),
         }
+    }
+
+    /// Returns how far b must move out of each group of contacts, for two scans; nothing for a mesh and a scan.
+    pub(crate) fn depths(
+        &self,
+        plan: &Plan,
+        insides: &Insides,
+        (contacts, groups): (&[Contact], &[ContactGroup]),
+        budget: &Budget,
+    ) -> Vec<Penetration> {
+        let (Self::Scans([a, b]), Plan::Scans(plan), Insides::Scans(interiors)) = (self, plan, insides)
+        else {
+            return Vec::new();
+        };
+        let groups: Vec<&ContactGroup> = groups.iter().collect();
+        let pair = Pair::new(*a, *b).within(budget);
+        pair.depths((contacts, &groups), (plan, *interiors), &mut Scratch::default(), &mut |_| ())
     }
 
     /// Returns the unit to which lengths are rounded: a hundredth of the smaller sampling radius.

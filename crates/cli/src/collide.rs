@@ -98,7 +98,14 @@ impl Question {
         let report = AnswerReport::new(&asked.answer, contacts.as_ref(), asked.micros).of(views.items());
         let report = report.with_manifold(manifold.as_deref());
         let all = contacts.as_ref().map(|all| all.contacts.as_slice());
-        let grouped = all.map(|all| (all, views.group(all, &args.contacts)));
+        let grouped = all.map(|all| {
+            let mut grouped = views.group(all, &args.contacts);
+            if let Some(insides) = &self.insides {
+                let groups = (all, grouped.groups.as_slice());
+                grouped.depths = views.depths(&self.plan, insides, groups, &self.budget_from(now()));
+            }
+            (all, grouped)
+        });
         if let Some((all, grouped)) = &grouped {
             let csv = args.path.csv.as_deref().filter(|_| asked.line.is_none());
             args.contacts.write(csv, all, grouped)?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nearmiss::io::{Column, PlyPoints};
 use nearmiss::query::default_link;
-use nearmiss::{Contact, ContactGroup, Placed};
+use nearmiss::{Contact, ContactGroup, Penetration, Placed};
 use serde::Serialize;
 
 use crate::digits::{count, place, rough, short};
@@ -82,6 +82,8 @@ pub(crate) struct Grouped {
     pub(crate) groups: Vec<ContactGroup>,
     /// The number of the clash of each contact, counted from 1.
     pub(crate) numbers: Vec<u32>,
+    /// How far b must move out of each clash; empty unless asked for.
+    pub(crate) depths: Vec<Penetration>,
 }
 
 impl Grouped {
@@ -90,12 +92,13 @@ impl Grouped {
         let mut groups = ContactGroup::all(contacts, link);
         groups.sort_by(ContactGroup::by_size);
         let numbers = numbers(contacts.len(), groups.iter().map(|group| &group.contacts));
-        Self { link, groups, numbers }
+        Self { link, groups, numbers, depths: Vec::new() }
     }
 
     /// Returns the clashes, for scripts.
     pub(crate) fn reports(&self, contacts: &[Contact]) -> Vec<GroupReport> {
-        self.groups.iter().map(|group| GroupReport::new(contacts, group)).collect()
+        let of = |(i, group)| GroupReport::new(contacts, group, self.depths.get(i));
+        self.groups.iter().enumerate().map(of).collect()
     }
 
     /// Returns the number of contacts and the clashes, for people.
@@ -109,7 +112,12 @@ impl Grouped {
         let line = |(number, group): (usize, &ContactGroup)| {
             let [x, y, z] = group.size().map(short);
             let contacts = count(group.contacts.len() as u64, "contact");
-            format!("  clash {number}: {contacts} about {}, {x} × {y} × {z}", place(group.centre(), unit))
+            let depth = self.depths.get(number - 1).filter(|depth| depth.upper.is_finite());
+            let depth = depth.map_or_else(String::new, |depth| format!(", {} deep", short(depth.upper)));
+            format!(
+                "  clash {number}: {contacts} about {}, {x} × {y} × {z}{depth}",
+                place(group.centre(), unit)
+            )
         };
         std::iter::once(head).chain((1..).zip(&self.groups).map(line)).collect()
     }
@@ -139,8 +147,10 @@ pub(crate) struct GroupReport {
     centre: [f64; 3],
     size: [f64; 3],
     bounds: [[f64; 3]; 2],
-    /// The penetration depth. Always null: no search computes it yet.
+    /// How far b must move out of the clash, at least and at most, and in which direction. Null unless asked for.
     depth: Option<f64>,
+    depth_lower: Option<f64>,
+    depth_direction: Option<[f64; 3]>,
     /// The place of the contact with the least residual.
     point: [f64; 3],
     residual: f64,
@@ -149,14 +159,17 @@ pub(crate) struct GroupReport {
 }
 
 impl GroupReport {
-    fn new(contacts: &[Contact], group: &ContactGroup) -> Self {
+    fn new(contacts: &[Contact], group: &ContactGroup, depth: Option<&Penetration>) -> Self {
         let nearest = &contacts[group.nearest];
+        let depth = depth.filter(|depth| depth.upper.is_finite());
         Self {
             contacts: group.contacts.len(),
             centre: group.centre(),
             size: group.size(),
             bounds: [group.bounds.min, group.bounds.max],
-            depth: None,
+            depth: depth.map(|depth| depth.upper),
+            depth_lower: depth.map(|depth| depth.lower),
+            depth_direction: depth.map(|depth| depth.direction),
             point: nearest.point,
             residual: nearest.residual,
             source_a: nearest.sources[0].0,

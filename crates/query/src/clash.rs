@@ -123,7 +123,12 @@ impl ClashPlan {
             .with_evidence(Evidence::Estimated);
         let touching = CollidePlan::new(&asked, a, b)?;
         let near = CollidePlan::new(&asked.with_margin(options.clearance), a, b)?;
-        Ok(Self { touching, near: (options.clearance > 0.0).then_some(near), link: options.link, depths: options.depths })
+        Ok(Self {
+            touching,
+            near: (options.clearance > 0.0).then_some(near),
+            link: options.link,
+            depths: options.depths,
+        })
     }
 
     /// The validated options of the search for contact.

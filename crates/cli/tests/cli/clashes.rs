@@ -28,8 +28,8 @@ fn two_balls_clash_in_a_circle() {
     assert_eq!(
         keys(&told[1]),
         sorted(
-            "id kind centre size bounds lower upper evidence contacts surroundings depth point residual source_a \
-             source_b"
+            "id kind centre size bounds lower upper evidence contacts surroundings depth depth_lower depth_direction \
+             point residual source_a source_b"
         )
     );
     assert_eq!(told.len(), 2, "one clash: {told:?}");
@@ -42,6 +42,33 @@ fn two_balls_clash_in_a_circle() {
     assert!(size[0] < 0.15 && (size[1] - 0.87).abs() < 0.15 && (size[2] - 0.87).abs() < 0.15, "{clash}");
     let people = place.ok(&["clash", "a.xyz", B, "--pose-b", &pose]).results;
     assert!(people.starts_with("clash  kind") && people.contains("1 clash, all hard."), "{people}");
+}
+
+#[test]
+fn depths_are_measured_on_request() {
+    let place = balls();
+    let pose = shift(1.8, 0.0, 0.0);
+    let asked = ["clash", "a.xyz", B, "--pose-b", &pose, "--depth"];
+    let told = place.ok(&[&asked[..], &["--solid", "both", "--json", "--csv", "c.csv"]].concat()).json();
+    let depth = |clash: &serde_json::Value| clash["depth"].as_f64().unwrap();
+    let (clash, way) = (&told[1], numbers(&told[1]["depth_direction"]));
+    assert!((depth(clash) - 0.2).abs() < 0.06 && way[0] > 0.95, "{clash}");
+    let lower = clash["depth_lower"].as_f64().unwrap();
+    assert!(lower > 0.1 && lower <= depth(clash), "{clash}");
+    let table = std::fs::read_to_string(place.path("c.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|&head| head == name).unwrap();
+    assert_eq!(rows[0].len(), rows[1].len());
+    for (name, number) in [("depth", depth(clash)), ("depth_lower", lower), ("depth_direction_x", way[0])] {
+        assert_eq!(rows[1][column(name)].parse::<f64>().unwrap(), number, "{name}");
+    }
+    let people = place.ok(&asked).results;
+    assert!(people.contains(" deep  "), "{people}");
+    let collided = ["collide", "a.xyz", B, "--pose-b", &pose, "--all", "--penetration", "--solid", "both"];
+    let all = place.ok(&[&collided[..], &["--json"]].concat()).json();
+    assert!((depth(&all[0]["clashes"][0]) - depth(clash)).abs() < 0.02, "{all:?}");
+    assert!(place.ok(&collided).results.contains(" deep\n"), "in the list for people");
+    place.refused(2, &["clash", "a.xyz", B, "--solid", "b"], &["--depth"]);
 }
 
 #[test]
@@ -79,7 +106,7 @@ fn pages_and_tables_hold_the_list_and_escape_names() {
     let rows: Vec<&str> = table.lines().collect();
     assert_eq!(rows.len(), 2, "{table}");
     assert!(rows[0].starts_with("id,kind,centre_x,") && rows[1].starts_with("1,hard,0."), "{table}");
-    assert!(rows[1].ends_with(",\"a.xyz\",\"b <i> \"\"c\"\".xyz\""), "{table}");
+    assert!(rows[1].contains(",\"a.xyz\",\"b <i> \"\"c\"\".xyz\","), "{table}");
     assert_eq!(rows[0].split(',').count(), rows[1].split(',').count(), "{table}");
     assert!(page.contains("b &lt;i&gt; &quot;c&quot;.xyz") && !page.contains("<i>"), "names are escaped");
     assert_eq!(page.matches("data:image/png;base64,").count(), 2, "an overview and a clash");

@@ -24,7 +24,8 @@ impl PointHierarchy {
         #[expect(clippy::cast_possible_truncation, reason = "counted in the reach")]
         let (place, reach) = (centre.map(|c| c as f32), (radius + 4e-6 * far) as f32);
         let square = radius * radius;
-        let mut search = InBall { scan: self, centre, square, most_sq: reach * reach, most, found: Vec::new() };
+        let mut search =
+            InBall { scan: self, centre, square, most_sq: reach * reach, most, found: Vec::new() };
         let flow = self.tree().descend_to(Level::new(), place, &mut search);
         flow.is_continue().then_some(search.found)
     }
@@ -43,7 +44,8 @@ impl PointHierarchy {
         if points.len() < LEAST_POINTS {
             return None;
         }
-        let positions: Vec<[f32; 3]> = points.iter().map(|&i| PointBlock::position_in(self.blocks(), i as usize)).collect();
+        let positions: Vec<[f32; 3]> =
+            points.iter().map(|&i| PointBlock::position_in(self.blocks(), i as usize)).collect();
         let source: Vec<u32> = points.iter().map(|&i| self.source()[i as usize]).collect();
         let mut bounds = Aabb::EMPTY;
         positions.iter().for_each(|&p| bounds.grow(self.frame().to_world(p)));

@@ -9,5 +9,6 @@ mod enclosures;
 mod kinds;
 mod levels;
 mod metric;
+mod parts;
 mod survey;
 mod twin;

@@ -138,7 +138,8 @@ impl<'s> MeshScanProbe<'s> {
     fn are_nested(&mut self, t: Vector) -> bool {
         let [is_scan_solid, is_mesh_solid] = self.are_solid;
         let (pose, solid) = (*self.mesh.pose(), self.solid_view());
-        let of_scan = || some_points(&self.scan).into_iter().map(|place| pose.apply_inverse((place - t).into()));
+        let of_scan =
+            || some_points(&self.scan).into_iter().map(|place| pose.apply_inverse((place - t).into()));
         if is_mesh_solid && of_scan().any(|place| solid.contains(place)) {
             return true;
         }

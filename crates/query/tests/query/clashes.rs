@@ -287,7 +287,10 @@ fn each_clash_has_the_depth_of_its_own_place() {
         for ((_, found), depth) in told.iter().zip([sunk[0], sunk[1], last]) {
             assert!((found.upper - depth).abs() < radius, "{interiors:?} {depth}: {found:?}");
             let lower = if interiors[0] == SOLID { depth - 1.5 * radius } else { 0.0 };
-            assert!(found.lower >= lower && found.lower <= depth + radius, "{interiors:?} {depth}: {found:?}");
+            assert!(
+                found.lower >= lower && found.lower <= depth + radius,
+                "{interiors:?} {depth}: {found:?}"
+            );
         }
     }
 }
