@@ -66,18 +66,18 @@ pub use nearmiss_hierarchy::{
     ScanPoints,
 };
 pub use nearmiss_query::{
-    Answer, AsShape, BatchScratch, Bodies, Body, BodyDistance, BodyId, BodyPair, Brackets, Budget, Clash,
-    ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions, CollidePlan, Contact, ContactGroup,
-    ContactRegion, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance,
-    DistanceOptions, DistancePlan, Evidence, Interior, Interpolation, ManifoldPoint, MeshAnswer, MeshContact,
-    MeshDistance, MeshHint, MeshItself, MeshPair, MeshQuality, MeshScanHint, MeshScanPair, MeshScanPlan,
-    MeshScanSweep, MeshScratch, MeshSolid, MeshVerdict, Method, Moving, NearestPair, NearestPoint, Order,
-    Pacer, Pair, PairHint, Penetration, Placed, PlacedBody, PlacedMesh, PlacedShape, PlanError, Prepared,
-    PreparedMesh, Proof, Question, Ray, RayAnswer, RayHit, Reason, Refinement, Sampling, Scratch, Semantics,
-    Shape, ShapeAnswer, ShapeContact, ShapeDistance, ShapeGap, ShapeHint, ShapeIndex, ShapeMeshDistance,
-    ShapeMeshPair, ShapePair, ShapePlan, ShapeScanPair, ShapeSweep, ShapeSweepVerdict, ShapeVerdict,
-    SolidMoments, Statistics, SupportMap, SurfelSize, Sweep, SweepAnswer, SweepOptions, SweepPlan,
-    SweepReason, SweepVerdict, Target, Until, Verdict, World, each,
+    Answer, AsShape, BatchScratch, Bodies, Body, BodyAnswer, BodyDistance, BodyId, BodyPair, BodyVerdict,
+    Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions, CollidePlan,
+    Contact, ContactGroup, ContactRegion, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan, Curves,
+    Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence, Interior, Interpolation,
+    ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself, MeshPair, MeshQuality,
+    MeshScanHint, MeshScanPair, MeshScanPlan, MeshScanSweep, MeshScratch, MeshSolid, MeshVerdict, Method,
+    Moving, NearestPair, NearestPoint, Order, Pacer, Pair, PairHint, Penetration, Placed, PlacedBody,
+    PlacedMesh, PlacedShape, PlanError, Prepared, PreparedMesh, Proof, Question, Ray, RayAnswer, RayHit,
+    Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeAnswer, ShapeContact, ShapeDistance,
+    ShapeGap, ShapeHint, ShapeIndex, ShapeMeshDistance, ShapeMeshPair, ShapePair, ShapePlan, ShapeScanPair,
+    ShapeSweep, ShapeSweepVerdict, ShapeVerdict, SolidMoments, Statistics, SupportMap, SurfelSize, Sweep,
+    SweepAnswer, SweepOptions, SweepPlan, SweepReason, SweepVerdict, Target, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

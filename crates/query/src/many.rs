@@ -4,4 +4,5 @@ pub(crate) mod batch;
 pub(crate) mod body;
 pub(crate) mod bounds;
 pub(crate) mod nearest;
+pub(crate) mod touch;
 pub(crate) mod world;

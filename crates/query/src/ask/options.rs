@@ -208,8 +208,12 @@ impl Default for CollideOptions {
 impl CollideOptions {
     /// The options of a search that only asks whether things meet, by the default method.
     pub(crate) fn of_verdicts(&self) -> Self {
-        let options = Self { evidence: Evidence::Estimated, detail: Detail::Verdict, ..*self };
-        Self { method: Method::Traversal, order: None, coverings: false, ..options }
+        Self { evidence: Evidence::Estimated, detail: Detail::Verdict, ..self.by_descent() }
+    }
+
+    /// The same options with the default method.
+    pub(crate) fn by_descent(&self) -> Self {
+        Self { method: Method::Traversal, order: None, coverings: false, ..*self }
     }
 
     /// The default options with [estimated](Evidence::Estimated) separations: no proofs, and the

@@ -39,6 +39,11 @@ impl MeshScanPlan {
         Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
     }
 
+    /// The plan for pairs of a world, with the options of one for two scans.
+    pub(crate) fn of_pair(plan: &CollidePlan) -> Self {
+        Self { options: plan.options().by_descent() }
+    }
+
     /// The contact test of a distance query.
     pub(crate) fn touching(plan: &DistancePlan) -> Self {
         Self { options: *plan.touching().options() }

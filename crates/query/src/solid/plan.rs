@@ -44,6 +44,11 @@ impl ShapePlan {
         Self::proving(options.with_detail(Detail::Verdict))
     }
 
+    /// The plan for pairs of a world, with the options of one for two scans.
+    pub(crate) fn of_plan(plan: &CollidePlan) -> Self {
+        Self { options: plan.options().by_descent() }
+    }
+
     /// The plan for the distance of a scan and a shape, with the meaning of one for two scans.
     pub(crate) fn of_distance(plan: &DistancePlan) -> Self {
         Self::proving(*plan.touching().options())

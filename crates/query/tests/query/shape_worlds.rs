@@ -6,9 +6,9 @@ use std::sync::Arc;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, MeshHierarchy, PointHierarchy};
 use nearmiss_query::{
-    AsShape, Bodies, Body, BodyId, BodyPair, CollideOptions, DistanceOptions, DistancePlan, PlacedBody,
-    PlacedShape, Prepared, PreparedMesh, Reason, Scratch, Shape, ShapePlan, ShapeScanPair, ShapeVerdict,
-    World,
+    AsShape, Bodies, Body, BodyId, BodyPair, BodyVerdict, CollideOptions, CollidePlan, DistanceOptions,
+    DistancePlan, PlacedBody, PlacedShape, Prepared, PreparedMesh, Reason, Scratch, Shape, ShapePlan,
+    ShapeScanPair, ShapeVerdict, World,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use rand::RngExt;
@@ -247,4 +247,83 @@ fn invalid_shapes_and_poses_are_near_everything_and_have_no_distance() {
     assert_eq!(beside, ids);
     world.near_shape(&ball, 0.0, &mut beside);
     assert_eq!(beside, ids[..2]);
+}
+
+/// Touches of all kinds of pairs agree with the distances of the same pairs, and with the questions about each
+/// kind.
+#[test]
+fn touches_of_all_kinds_agree_with_their_distances() {
+    let rng = &mut rng(6105);
+    let mesh = prepared(&cube(4));
+    let apart = DistancePlan::new(&DistanceOptions::default(), &SCANS[0], &SCANS[1]).unwrap();
+    let scratch = &mut Scratch::default();
+    let mut kinds = [[0; 2]; 6];
+    for round in 0..12_u32 {
+        let margin = [0.0, 0.2][round as usize % 2];
+        let options = CollideOptions::default().with_margin(margin);
+        let plan = CollidePlan::new(&options, &SCANS[0], &SCANS[1]).unwrap();
+        let (world, known) = crowd(&mesh, 26, [3.0, 6.0][round as usize / 2 % 2], rng);
+        for (j, b) in known.iter().enumerate() {
+            for a in &known[..j] {
+                let pair = world.body_pair([a.0, b.0]).unwrap();
+                let (found, distance) = (pair.touch(&plan, scratch), pair.distance(&apart, scratch).unwrap());
+                let context = format!("{found:?}, {distance:?}, {a:?}, {b:?}");
+                let kind = match &pair {
+                    BodyPair::Scans(_) => 0,
+                    BodyPair::MeshAndScan { .. } => 1,
+                    BodyPair::Meshes(_) => 2,
+                    BodyPair::ShapeAndScan { .. } => 3,
+                    BodyPair::ShapeAndMesh { .. } => 4,
+                    BodyPair::Shapes(_) => 5,
+                };
+                if let BodyPair::ShapeAndScan { pair, .. } = &pair {
+                    let own = pair.touch(&ShapePlan::new(&options, &SCANS[0]).unwrap(), scratch);
+                    assert_eq!(
+                        (own.verdict.is_touching(), own.band),
+                        (found.verdict.is_touching(), found.band)
+                    );
+                }
+                let is_exact = matches!(kind, 2 | 4 | 5);
+                match found.verdict {
+                    BodyVerdict::Touching { point, .. } => {
+                        kinds[kind][1] += 1;
+                        assert!(distance.lower <= margin + 1e-8, "{context}");
+                        let bounds = [a, b].map(|body| world.bounds(body.0).unwrap());
+                        let more = 0.5 * margin + found.band + 1e-6;
+                        let is_near = |bounds: &nearmiss_geometry::Aabb| {
+                            (0..3)
+                                .all(|k| point[k] >= bounds.min[k] - more && point[k] <= bounds.max[k] + more)
+                        };
+                        assert!(bounds.iter().all(is_near), "the place, {context}");
+                    }
+                    BodyVerdict::Separated { .. } => {
+                        kinds[kind][0] += 1;
+                        let least = margin - if is_exact { 1e-8 } else { found.band };
+                        assert!(distance.upper > least || distance.upper == 0.0 && !is_exact, "{context}");
+                    }
+                    BodyVerdict::Undecided(_) => assert!(!is_exact, "{context}"),
+                }
+                assert!(!is_exact || found.band == 0.0, "{context}");
+            }
+        }
+    }
+    assert!(kinds.iter().flatten().all(|&count| count >= 5), "all kinds touch and are apart: {kinds:?}");
+
+    // Invalid poses and shapes.
+    let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[1]).unwrap();
+    let lost = Pose::from_translation([f64::NAN, 0.0, 0.0]);
+    let ball = Shape::Sphere { centre: [0.0; 3], radius: 1.0 };
+    let bodies = |at: &Pose| {
+        [PlacedBody::Scan(SCANS[0].at(at)), PlacedBody::Mesh(mesh.at(at)), PlacedBody::Shape(ball.at(at))]
+    };
+    for a in bodies(&lost) {
+        for b in bodies(&Pose::IDENTITY) {
+            for pair in [BodyPair::new(a, b), BodyPair::new(b, a)] {
+                let found = pair.touch(&plan, scratch);
+                let is_refused =
+                    matches!(found.verdict, BodyVerdict::Undecided(Reason::Pose | Reason::Shape));
+                assert!(is_refused && found.band == f64::INFINITY, "{found:?} {pair:?}");
+            }
+        }
+    }
 }
