@@ -360,8 +360,8 @@ typedef struct NearmissSliceMap NearmissSliceMap;
 typedef struct NearmissWalker NearmissWalker;
 
 /*
- Placed scans, each a body with an id. Any number of threads may ask at the same time, while none
- changes it.
+ Placed scans and convex shapes, each a body with an id. Any number of threads may ask at the same time,
+ while none changes it.
  */
 typedef struct NearmissWorld NearmissWorld;
 
@@ -1125,6 +1125,32 @@ typedef struct NearmissBodyPair {
     uint64_t b;
 } NearmissBodyPair;
 
+/*
+ Bounds on the distance of two bodies. Infinite if it is not known.
+ */
+typedef struct NearmissBodyDistance {
+    /*
+     The bodies, the smaller id first; `UINT64_MAX` if there are none.
+     */
+    struct NearmissBodyPair pair;
+    /*
+     A proven lower bound.
+     */
+    double lower;
+    /*
+     An upper bound: the distance of the two points. 0 if the bodies touch.
+     */
+    double upper;
+    /*
+     The nearest place on the first body.
+     */
+    double point_a[3];
+    /*
+     The nearest place on the second body.
+     */
+    double point_b[3];
+} NearmissBodyDistance;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1694,6 +1720,19 @@ NearmissStatus nearmiss_world_insert(struct NearmissWorld *world,
                                      uint64_t *out);
 
 /*
+ Adds a convex shape and writes its id to `out`. `pose` maps the frame in which the shape is given to the
+ world; null leaves the shape where it is. The world copies the shape, and the points of a hull. Thread
+ safety: no other call may use the world at the same time.
+
+ # Safety
+ The points of a hull are valid; other pointers are null or valid.
+ */
+NearmissStatus nearmiss_world_insert_shape(struct NearmissWorld *world,
+                                           const struct NearmissShape *shape,
+                                           const struct NearmissPose *pose,
+                                           uint64_t *out);
+
+/*
  Removes a body. Thread safety: no other call may use the world at the same time.
  */
 NearmissStatus nearmiss_world_remove(struct NearmissWorld *world, uint64_t id);
@@ -1723,8 +1762,9 @@ NearmissStatus nearmiss_world_near_pairs(const struct NearmissWorld *world,
                                          size_t *count);
 
 /*
- Decides whether two bodies touch, as `nearmiss_collide` does for two scans. Thread safety: one call
- at a time for each scratch and each hint.
+ Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
+ `nearmiss_touch` does, and two shapes exactly. `limits` and `hint` count for two scans only. An answer about a
+ shape has no normals. Thread safety: one call at a time for each scratch and each hint.
  */
 NearmissStatus nearmiss_world_collide(const struct NearmissWorld *world,
                                       const struct NearmissPlan *plan,
@@ -1733,6 +1773,34 @@ NearmissStatus nearmiss_world_collide(const struct NearmissWorld *world,
                                       struct NearmissHint *hint,
                                       struct NearmissScratch *scratch,
                                       struct NearmissAnswer *out);
+
+/*
+ Bounds the distance of two bodies: of two scans as `nearmiss_distance` does. Infinite for invalid poses.
+ `limits` may be null. Thread safety: one call at a time for each scratch.
+ */
+NearmissStatus nearmiss_world_distance(const struct NearmissWorld *world,
+                                       const struct NearmissPlan *plan,
+                                       struct NearmissBodyPair pair,
+                                       const struct NearmissBudget *limits,
+                                       struct NearmissScratch *scratch,
+                                       struct NearmissBodyDistance *out);
+
+/*
+ Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`, which
+ may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot. `lower` is a
+ bound for all pairs that count. If none does, both ids are `UINT64_MAX`. Thread safety: one call at a time for
+ each scratch.
+
+ # Safety
+ `ignored` are `ignored_count` pairs; other pointers are null or valid.
+ */
+NearmissStatus nearmiss_world_nearest_pair(const struct NearmissWorld *world,
+                                           const struct NearmissPlan *plan,
+                                           double reach,
+                                           const struct NearmissBodyPair *ignored,
+                                           size_t ignored_count,
+                                           struct NearmissScratch *scratch,
+                                           struct NearmissBodyDistance *out);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,6 +1,6 @@
 //! Answers of questions about two scans.
 
-use nearmiss::{Reason as Why, Verdict as Found};
+use nearmiss::{BodyVerdict, Reason as Why, ShapeVerdict, Verdict as Found};
 
 use crate::options::Evidence;
 
@@ -101,12 +101,12 @@ pub struct Answer {
 }
 
 impl Answer {
-    #[inline]
-    pub(crate) fn new(answer: &nearmiss::Answer) -> Self {
-        let none = Self {
+    /// An undecided answer.
+    const fn undecided(reason: Reason, band: f64) -> Self {
+        Self {
             verdict: Verdict::Undecided,
             evidence: Evidence::None,
-            reason: Reason::None,
+            reason,
             source_a: NOBODY,
             source_b: NOBODY,
             witness: NOWHERE,
@@ -114,11 +114,52 @@ impl Answer {
             normal_b: NOWHERE,
             residual: NONE,
             gap: NONE,
-            band: answer.band,
+            band,
             likelihood: NONE,
+            evaluations: 0,
+            node_pairs: 0,
+            leaf_pairs: 0,
+        }
+    }
+
+    /// The answer about a scan and a shape.
+    pub(crate) fn of_shape(answer: &nearmiss::ShapeAnswer, shape_is_first: bool) -> Self {
+        let none = Self::undecided(Reason::None, answer.band);
+        match answer.verdict {
+            ShapeVerdict::Touching { point: witness, source, evidence: certainty } => {
+                let (verdict, evidence) = (Verdict::Touching, evidence(certainty));
+                let [source_a, source_b] =
+                    if shape_is_first { [NOBODY, source.0] } else { [source.0, NOBODY] };
+                Self { verdict, evidence, witness, source_a, source_b, ..none }
+            }
+            ShapeVerdict::Separated { evidence: certainty } => {
+                Self { verdict: Verdict::Separated, evidence: evidence(certainty), ..none }
+            }
+            ShapeVerdict::Undecided(why) => Self { reason: Reason::new(why), ..none },
+        }
+    }
+
+    /// The answer about two bodies.
+    pub(crate) fn of_bodies(answer: &nearmiss::BodyAnswer) -> Self {
+        let none = Self::undecided(Reason::None, answer.band);
+        match answer.verdict {
+            BodyVerdict::Touching { point: witness, evidence: certainty } => {
+                Self { verdict: Verdict::Touching, evidence: evidence(certainty), witness, ..none }
+            }
+            BodyVerdict::Separated { evidence: certainty } => {
+                Self { verdict: Verdict::Separated, evidence: evidence(certainty), ..none }
+            }
+            BodyVerdict::Undecided(why) => Self { reason: Reason::new(why), ..none },
+        }
+    }
+
+    #[inline]
+    pub(crate) fn new(answer: &nearmiss::Answer) -> Self {
+        let none = Self {
             evaluations: answer.statistics.evaluations,
             node_pairs: answer.statistics.node_pairs,
             leaf_pairs: answer.statistics.leaf_pairs,
+            ..Self::undecided(Reason::None, answer.band)
         };
         match answer.verdict {
             Found::Intersecting { contact, evidence: certainty } => {

@@ -160,3 +160,38 @@ impl Shape {
         })
     }
 }
+
+/// A shape that owns the points of its hull.
+#[derive(Debug, Clone)]
+pub(crate) enum OwnShape {
+    Hull(Box<[[f64; 3]]>, f64),
+    Other(Convex<'static>),
+}
+
+impl OwnShape {
+    pub(crate) fn new(shape: Convex<'_>) -> Result<Self, Failure> {
+        Ok(Self::Other(match shape {
+            Convex::Sphere { centre, radius } => Convex::Sphere { centre, radius },
+            Convex::Capsule { ends, radius } => Convex::Capsule { ends, radius },
+            Convex::Box { pose, half, radius } => Convex::Box { pose, half, radius },
+            Convex::Cylinder { pose, half_height, radius, rounding } => {
+                Convex::Cylinder { pose, half_height, radius, rounding }
+            }
+            Convex::Cone { pose, half_height, radius, rounding } => {
+                Convex::Cone { pose, half_height, radius, rounding }
+            }
+            Convex::Triangle { points, radius } => Convex::Triangle { points, radius },
+            Convex::Hull { points, radius } => return Ok(Self::Hull(points.into(), radius)),
+            _ => return Err(Failure::argument("expected a kind of shape of 0 to 6")),
+        }))
+    }
+}
+
+impl nearmiss::AsShape for OwnShape {
+    fn as_shape(&self) -> Convex<'_> {
+        match self {
+            Self::Hull(points, radius) => Convex::Hull { points, radius: *radius },
+            Self::Other(shape) => *shape,
+        }
+    }
+}

@@ -1,10 +1,11 @@
-//! Worlds: many placed scans.
+//! Worlds: many placed scans and shapes.
 
+use std::convert::Infallible;
 use std::mem::MaybeUninit;
 
 use nearmiss::{Bodies, BodyId};
 
-use crate::answer::Answer;
+use crate::answer::{Answer, NOWHERE};
 use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::hint::Hint;
 use crate::options::{Budget, budget};
@@ -12,14 +13,20 @@ use crate::plan::Plan;
 use crate::pointer::{fill, required, slice, write};
 use crate::pose::{Placed, Pose};
 use crate::scratch::Scratch;
+use crate::shape::{OwnShape, Shape};
 use crate::status::{Failure, Status, guard};
 
-/// Placed scans, each a body with an id. Any number of threads may ask at the same time, while none
-/// changes it.
-#[derive(Debug)]
-pub struct World(Handle<nearmiss::World<nearmiss::Scan>>);
+/// The bodies of a world.
+///
+/// cbindgen:ignore
+type Crowd = nearmiss::World<nearmiss::Scan, Infallible, OwnShape>;
 
-opaque!(World of nearmiss::World<nearmiss::Scan> as b"nm-world");
+/// Placed scans and convex shapes, each a body with an id. Any number of threads may ask at the same time,
+/// while none changes it.
+#[derive(Debug)]
+pub struct World(Handle<Crowd>);
+
+opaque!(World of Crowd as b"nm-world");
 
 /// The ids of two bodies, the smaller one first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +38,40 @@ pub struct BodyPair {
     pub b: u64,
 }
 
+/// Bounds on the distance of two bodies. Infinite if it is not known.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct BodyDistance {
+    /// The bodies, the smaller id first; `UINT64_MAX` if there are none.
+    pub pair: BodyPair,
+    /// A proven lower bound.
+    pub lower: f64,
+    /// An upper bound: the distance of the two points. 0 if the bodies touch.
+    pub upper: f64,
+    /// The nearest place on the first body.
+    pub point_a: [f64; 3],
+    /// The nearest place on the second body.
+    pub point_b: [f64; 3],
+}
+
+impl BodyDistance {
+    fn new(pair: BodyPair, lower: f64, upper: f64, [point_a, point_b]: [[f64; 3]; 2]) -> Self {
+        Self { pair, lower, upper, point_a, point_b }
+    }
+
+    /// Nothing is known about the distance.
+    fn unknown(pair: BodyPair) -> Self {
+        Self::new(pair, f64::INFINITY, f64::INFINITY, [NOWHERE; 2])
+    }
+}
+
+/// The pair of two bodies of a world.
+fn pair_of(world: &Crowd, pair: BodyPair) -> Result<nearmiss::BodyPair<'_>, Failure> {
+    let ids = [BodyId(pair.a), BodyId(pair.b)];
+    let missing = || no_body(if world.body(ids[0]).is_none() { pair.a } else { pair.b });
+    world.body_pair(ids).ok_or_else(missing)
+}
+
 fn no_body(id: u64) -> Failure {
     Failure::argument(format_args!("expected the id of a body of this world, got {id}"))
 }
@@ -38,7 +79,7 @@ fn no_body(id: u64) -> Failure {
 /// Makes an empty world. Thread safety: any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_new(out: Option<&mut MaybeUninit<*mut World>>) -> Status {
-    guard(|| make(out, || Ok(nearmiss::World::new())))
+    guard(|| make(out, || Ok(Crowd::with_shapes())))
 }
 
 /// Frees a world; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -68,10 +109,33 @@ pub extern "C" fn nearmiss_world_insert(
     })
 }
 
+/// Adds a convex shape and writes its id to `out`. `pose` maps the frame in which the shape is given to the
+/// world; null leaves the shape where it is. The world copies the shape, and the points of a hull. Thread
+/// safety: no other call may use the world at the same time.
+///
+/// # Safety
+/// The points of a hull are valid; other pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nearmiss_world_insert_shape(
+    world: Option<&mut World>,
+    shape: Option<&Shape>,
+    pose: Option<&Pose>,
+    out: Option<&mut MaybeUninit<u64>>,
+) -> Status {
+    guard(|| {
+        let world = get_mut(world, "world")?;
+        // SAFETY: the caller promises the points of a hull.
+        let shape = OwnShape::new(unsafe { required(shape, "shape")?.checked() }?)?;
+        let pose = pose.map_or(Ok(nearmiss::Pose::IDENTITY), Pose::checked)?;
+        let out = out.ok_or_else(|| Failure::null("out"))?;
+        write(Some(out), world.insert_shape(shape, &pose).0)
+    })
+}
+
 /// Removes a body. Thread safety: no other call may use the world at the same time.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_remove(world: Option<&mut World>, id: u64) -> Status {
-    guard(|| get_mut(world, "world")?.remove(BodyId(id)).map(drop).ok_or_else(|| no_body(id)))
+    guard(|| get_mut(world, "world")?.remove_body(BodyId(id)).map(drop).ok_or_else(|| no_body(id)))
 }
 
 /// Moves a body. Thread safety: no other call may use the world at the same time.
@@ -115,8 +179,9 @@ pub unsafe extern "C" fn nearmiss_world_near_pairs(
     })
 }
 
-/// Decides whether two bodies touch, as `nearmiss_collide` does for two scans. Thread safety: one call
-/// at a time for each scratch and each hint.
+/// Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
+/// `nearmiss_touch` does, and two shapes exactly. `limits` and `hint` count for two scans only. An answer about a
+/// shape has no normals. Thread safety: one call at a time for each scratch and each hint.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_collide(
     world: Option<&World>,
@@ -128,15 +193,81 @@ pub extern "C" fn nearmiss_world_collide(
     out: Option<&mut MaybeUninit<Answer>>,
 ) -> Status {
     guard(|| {
-        let (world, plan) = (get(world, "world")?, &get(plan, "plan")?.collide);
-        let ids = [BodyId(pair.a), BodyId(pair.b)];
-        let missing = || no_body(if world.placed(ids[0]).is_none() { pair.a } else { pair.b });
-        let pair = world.pair(ids).ok_or_else(missing)?.within(&budget(limits)?);
+        let (world, plan) = (get(world, "world")?, get(plan, "plan")?);
+        let pair = pair_of(world, pair)?.within(&budget(limits)?);
         let memory = get_mut(scratch, "scratch")?;
-        let answer = match hint {
-            None => pair.collide(plan, &mut memory.scratch),
-            hint => pair.hinted(get_mut(hint, "hint")?).collide(plan, &mut memory.scratch),
+        let answer = match (&pair, hint) {
+            (nearmiss::BodyPair::Scans(pair), None) => {
+                Answer::new(&pair.collide(&plan.collide, &mut memory.scratch))
+            }
+            (nearmiss::BodyPair::Scans(pair), hint) => {
+                let hint = get_mut(hint, "hint")?;
+                Answer::new(&pair.hinted(hint).collide(&plan.collide, &mut memory.scratch))
+            }
+            (nearmiss::BodyPair::ShapeAndScan { pair, shape_is_first }, _) => {
+                Answer::of_shape(&pair.touch(&plan.shape, &mut memory.scratch), *shape_is_first)
+            }
+            (pair, _) => Answer::of_bodies(&pair.touch(&plan.collide, &mut memory.scratch)),
         };
-        write(out, Answer::new(&answer))
+        write(out, answer)
+    })
+}
+
+/// Bounds the distance of two bodies: of two scans as `nearmiss_distance` does. Infinite for invalid poses.
+/// `limits` may be null. Thread safety: one call at a time for each scratch.
+#[unsafe(no_mangle)]
+pub extern "C" fn nearmiss_world_distance(
+    world: Option<&World>,
+    plan: Option<&Plan>,
+    pair: BodyPair,
+    limits: Option<&Budget>,
+    scratch: Option<&mut Scratch>,
+    out: Option<&mut MaybeUninit<BodyDistance>>,
+) -> Status {
+    guard(|| {
+        let (world, plan) = (get(world, "world")?, get(plan, "plan")?);
+        let bodies = pair_of(world, pair)?.within(&budget(limits)?);
+        let found = bodies.distance(&plan.distance, &mut get_mut(scratch, "scratch")?.scratch);
+        let told =
+            |found: nearmiss::BodyDistance| BodyDistance::new(pair, found.lower, found.upper, found.points);
+        write(out, found.map_or(BodyDistance::unknown(pair), told))
+    })
+}
+
+/// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`, which
+/// may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot. `lower` is a
+/// bound for all pairs that count. If none does, both ids are `UINT64_MAX`. Thread safety: one call at a time for
+/// each scratch.
+///
+/// # Safety
+/// `ignored` are `ignored_count` pairs; other pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nearmiss_world_nearest_pair(
+    world: Option<&World>,
+    plan: Option<&Plan>,
+    reach: f64,
+    ignored: *const BodyPair,
+    ignored_count: usize,
+    scratch: Option<&mut Scratch>,
+    out: Option<&mut MaybeUninit<BodyDistance>>,
+) -> Status {
+    guard(|| {
+        let (world, plan) = (get(world, "world")?, get(plan, "plan")?);
+        if reach.is_nan() || reach < 0.0 {
+            return Err(Failure::argument(format_args!("expected a reach of at least 0, got {reach}")));
+        }
+        // SAFETY: the caller promises the pairs.
+        let ignored = unsafe { slice(ignored, ignored_count, "ignored") }?;
+        let counts = |a: BodyId, b: BodyId| {
+            !ignored.iter().any(|pair| [(pair.a, pair.b), (pair.b, pair.a)].contains(&(a.0, b.0)))
+        };
+        let memory = &mut get_mut(scratch, "scratch")?.scratch;
+        let found = world.nearest_pair(Bodies::All, reach, counts, &plan.distance, memory);
+        let told = |found: nearmiss::NearestPair| {
+            let [a, b] = found.ids.map(|id| id.0);
+            BodyDistance::new(BodyPair { a, b }, found.lower, found.upper, found.points)
+        };
+        let none = BodyPair { a: u64::MAX, b: u64::MAX };
+        write(out, found.map_or(BodyDistance::unknown(none), told))
     })
 }

@@ -197,6 +197,65 @@ static void worlds(void) {
     OK(nearmiss_world_free(world));
 }
 
+/* A robot of two links above a floor: its nearest pair, and which of its bodies touch. */
+static void worlds_of_shapes(void) {
+    NearmissWorld *world;
+    uint64_t floor, arm, hand, wedge;
+    NearmissPlaced low = at(0, 0, 0);
+    const double start[3] = {0, 0, 0}, end[3] = {0.2, 0, 0}, centre[3] = {0, 0, 0};
+    double corners[12] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
+    NearmissShape rod = nearmiss_capsule(&start, &end, 0.02), ball = nearmiss_sphere(&centre, 0.05);
+    NearmissShape hull = nearmiss_hull(corners, 4, 0.0);
+    OK(nearmiss_world_new(&world));
+    OK(nearmiss_world_insert(world, &low, &floor));
+    NearmissPose pose = at(0.3, 0.5, 0.4).pose;
+    OK(nearmiss_world_insert_shape(world, &rod, &pose, &arm));
+    pose = at(0.5, 0.5, 0.4).pose;
+    OK(nearmiss_world_insert_shape(world, &ball, &pose, &hand));
+    OK(nearmiss_world_insert_shape(world, &hull, NULL, &wedge));
+    corners[0] = corners[1] = corners[2] = NAN; /* The world has a copy. */
+    pose = at(0.3, 0.3, 3.0).pose;
+    OK(nearmiss_world_move(world, wedge, &pose));
+
+    NearmissBodyPair joint = {hand, arm};
+    NearmissBodyDistance found;
+    OK(nearmiss_world_nearest_pair(world, plan, INFINITY, &joint, 1, scratch, &found));
+    CHECK(found.pair.a == floor && found.pair.b == hand && found.lower > 0.34 && fabs(found.upper - 0.35) < 1e-6);
+    CHECK(fabs(found.point_a[2]) < 1e-6 && fabs(found.point_b[2] - 0.35) < 1e-6);
+    OK(nearmiss_world_nearest_pair(world, plan, INFINITY, NULL, 0, scratch, &found));
+    CHECK(found.upper == 0.0);
+    OK(nearmiss_world_nearest_pair(world, plan, 0.01, &joint, 1, scratch, &found));
+    CHECK(found.pair.a == UINT64_MAX && isinf(found.upper));
+    OK(nearmiss_world_distance(world, plan, (NearmissBodyPair){floor, wedge}, NULL, scratch, &found));
+    CHECK(found.lower > 2.95 && fabs(found.upper - 3.0) < 1e-6);
+
+    NearmissAnswer answer;
+    OK(nearmiss_world_collide(world, plan, joint, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && answer.evidence == NEARMISS_EVIDENCE_CERTIFIED);
+    CHECK(answer.source_a == UINT32_MAX && answer.band == 0.0);
+    OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){floor, hand}, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED);
+    pose = at(0.5, 0.5, 0.03).pose;
+    OK(nearmiss_world_move(world, hand, &pose));
+    OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){floor, hand}, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && answer.source_a != UINT32_MAX);
+    CHECK(answer.source_b == UINT32_MAX && fabs(answer.witness[2]) < 1e-6);
+    OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){hand, floor}, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && answer.source_b != UINT32_MAX);
+
+    NearmissBodyPair near[6];
+    size_t count;
+    OK(nearmiss_world_near_pairs(world, plan, &hand, 1, scratch, near, 6, &count));
+    CHECK(count == 1 && near[0].a == floor && near[0].b == hand);
+    OK(nearmiss_world_remove(world, hand));
+    FAILS(nearmiss_world_remove(world, hand), NEARMISS_STATUS_ARGUMENT, "id of a body");
+    rod.radius = -1.0;
+    FAILS(nearmiss_world_insert_shape(world, &rod, NULL, &arm), NEARMISS_STATUS_ARGUMENT, "at least 0, got -1");
+    FAILS(nearmiss_world_nearest_pair(world, plan, -1.0, NULL, 0, scratch, &found), NEARMISS_STATUS_ARGUMENT,
+          "reach of at least 0");
+    OK(nearmiss_world_free(world));
+}
+
 static void maps(void) {
     enum { SIDE = 60, COUNT = SIDE * SIDE + 4 * SIDE * 40 };
     double *points = malloc(3 * COUNT * sizeof *points), *p = points;
@@ -273,6 +332,7 @@ int main(void) {
     rays();
     motions();
     worlds();
+    worlds_of_shapes();
     maps();
     messages();
     OK(nearmiss_scratch_free(scratch));
