@@ -86,15 +86,27 @@ impl DistancePlan {
     /// - [`PlanError::Metric`] if a scan was prepared for another metric than the options ask for,
     /// - [`PlanError::Metrics`] if the metrics of the scans differ.
     pub fn new(options: &DistanceOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
+        Self::of_metrics(options, [a.metric(), b.metric()])
+    }
+
+    /// Validates `options` for any scans of a metric, such as those that a [world](crate::World) will have.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_metric(options: &DistanceOptions, metric: Metric) -> Result<Self, PlanError> {
+        Self::of_metrics(options, [metric; 2])
+    }
+
+    fn of_metrics(options: &DistanceOptions, metrics: [Metric; 2]) -> Result<Self, PlanError> {
         if !(0.0..1.0).contains(&options.relative) {
             return Err(PlanError::Relative(options.relative));
         }
         let asked = CollideOptions { metric: options.metric, ..CollideOptions::estimated() }
             .with_semantics(options.semantics)
             .with_detail(Detail::Witness);
-        let touching = CollidePlan::new(&asked, a, b)?;
+        let touching = CollidePlan::of_metrics(&asked, metrics)?;
         let points = asked.with_semantics(Semantics::Thickened(0.0)).with_margin(f64::MAX);
-        let boundless = CollidePlan::new(&points, a, b)?;
+        let boundless = CollidePlan::of_metrics(&points, metrics)?;
         let options = DistanceOptions { metric: touching.options().metric, ..*options };
         Ok(Self { options, touching, boundless })
     }

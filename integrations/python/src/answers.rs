@@ -1,6 +1,6 @@
 //! Answers about two scans: a record in arrays, and a class with the same names for one question.
 
-use nearmiss::{Evidence, MeshVerdict, Reason, Verdict};
+use nearmiss::{BodyVerdict, Evidence, MeshVerdict, Reason, ShapeVerdict, Verdict};
 use pyo3::prelude::*;
 
 use crate::codes::{
@@ -96,6 +96,40 @@ impl PairRecord for AnswerRecord {
 }
 
 impl AnswerRecord {
+    /// An answer of which nothing is known but the band.
+    fn unasked(band: f64) -> Self {
+        Self { likelihood: NONE, band, reason: 0, ..Self::new(&nearmiss::Answer::UNASKED) }
+    }
+
+    /// An answer about a scan and a shape.
+    pub(crate) fn of_shape(answer: &nearmiss::ShapeAnswer) -> Self {
+        let none = Self::unasked(answer.band);
+        match answer.verdict {
+            ShapeVerdict::Touching { point: witness, source, evidence } => {
+                let (source_a, evidence) = (source.0.into(), evidence_code(evidence));
+                Self { verdict: 1, witness, source_a, evidence, ..none }
+            }
+            ShapeVerdict::Separated { evidence } => {
+                Self { verdict: 0, evidence: evidence_code(evidence), ..none }
+            }
+            ShapeVerdict::Undecided(reason) => Self { reason: reason_code(reason), ..none },
+        }
+    }
+
+    /// An answer about two bodies.
+    pub(crate) fn of_bodies(answer: &nearmiss::BodyAnswer) -> Self {
+        let none = Self::unasked(answer.band);
+        match answer.verdict {
+            BodyVerdict::Touching { point: witness, evidence } => {
+                Self { verdict: 1, witness, evidence: evidence_code(evidence), ..none }
+            }
+            BodyVerdict::Separated { evidence } => {
+                Self { verdict: 0, evidence: evidence_code(evidence), ..none }
+            }
+            BodyVerdict::Undecided(reason) => Self { reason: reason_code(reason), ..none },
+        }
+    }
+
     /// An answer about two meshes, which is exact unless it is undecided. Sources are triangles.
     pub(crate) fn of_meshes(answer: &nearmiss::MeshAnswer) -> Self {
         let mut record = Self { likelihood: answer.likelihood, ..Self::new(&nearmiss::Answer::UNASKED) };
@@ -181,6 +215,29 @@ record! {
 }
 
 impl DistanceRecord {
+    /// The record of a distance that is not known.
+    pub(crate) const UNKNOWN: Self = Self {
+        point_a: NOWHERE,
+        point_b: NOWHERE,
+        lower: f64::INFINITY,
+        upper: f64::INFINITY,
+        band: NONE,
+        source_a: -1,
+        source_b: -1,
+        evaluations: 0,
+        node_pairs: 0,
+        leaf_pairs: 0,
+        evidence: -1,
+        complete: 1,
+        _padding: [0; 6],
+    };
+
+    /// The record of the distance of two bodies, which is proven.
+    pub(crate) fn of_bodies((lower, upper): (f64, f64), [point_a, point_b]: [[f64; 3]; 2]) -> Self {
+        let evidence = evidence_code(Evidence::Certified);
+        Self { point_a, point_b, lower, upper, evidence, ..Self::UNKNOWN }
+    }
+
     pub(crate) fn new(distance: &nearmiss::Distance) -> Self {
         let [point_a, point_b] = distance.points;
         let [source_a, source_b] = distance.sources.map(|source| i64::from(source.0));

@@ -1,6 +1,6 @@
 //! Poses: 4×4 matrices, rotations with `as_matrix()`, and pairs of a rotation and a translation.
 
-use nearmiss::{Aabb, Mesh, PointHierarchy, Pose};
+use nearmiss::{Aabb, Mesh, MeshHierarchy, PointHierarchy, Pose};
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -34,14 +34,24 @@ impl Placeable for PointHierarchy {
     }
 }
 
-impl Placeable for Mesh {
+impl Placeable for MeshHierarchy {
     fn bounds(&self) -> &Aabb {
-        nearmiss::MeshHierarchy::bounds(self)
+        Self::bounds(self)
     }
 
     fn tolerance(&self) -> f64 {
         let sum: f64 = Placeable::bounds(self).half_extents().iter().map(|half| half * half).sum();
         2.0 * OF_DIAGONAL * sum.sqrt()
+    }
+}
+
+impl Placeable for Mesh {
+    fn bounds(&self) -> &Aabb {
+        MeshHierarchy::bounds(self)
+    }
+
+    fn tolerance(&self) -> f64 {
+        MeshHierarchy::tolerance(self)
     }
 }
 
@@ -90,6 +100,16 @@ impl<'py> Poses<'py> {
             Self::Many(_) => Err(refused(
                 "expected one pose of shape (4, 4) here, got an array of poses; ask once for each pose",
             )),
+        }
+    }
+
+    /// Returns the one pose of a shape; fails for many.
+    pub(crate) fn one_of_shape(&self) -> PyResult<Pose> {
+        match self {
+            Self::One(matrix) => Pose::from_matrix(matrix).map_err(refused),
+            Self::Many(_) => {
+                Err(refused("expected one pose of shape (4, 4) of a shape, got an array of poses"))
+            }
         }
     }
 

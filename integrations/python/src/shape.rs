@@ -74,10 +74,7 @@ impl Shape {
 
 /// Reads the pose of a shape.
 fn pose(given: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
-    match Poses::new(given)? {
-        Poses::One(matrix) => Pose::from_matrix(&matrix).map_err(refused),
-        Poses::Many(_) => Err(refused("expected one pose of shape (4, 4) of a shape, got an array of poses")),
-    }
+    Poses::new(given)?.one_of_shape()
 }
 
 #[pymethods]

@@ -1,47 +1,129 @@
-//! `World`: many placed scans.
+//! `World`: many placed scans, meshes and convex shapes.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
-use nearmiss::{Bodies, BodyId, CollidePlan, Pose, Scan as Prepared, World as Placed};
-use pyo3::exceptions::PyKeyError;
+use nearmiss::{
+    AsShape, Bodies, BodyId, BodyPair, CollidePlan, DistanceOptions, DistancePlan, Mesh as PreparedMesh,
+    MeshScanPlan, Metric, PlacedBody, Pose, Scan as PreparedScan, Scratch, Shape as Convex, ShapePlan,
+    World as Crowd,
+};
+use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::answers::AnswerRecord;
+use crate::answers::{AnswerRecord, Distance, DistanceRecord, PairRecord as _};
 use crate::cloud::rows;
 use crate::failure::refused;
-use crate::options::{OF_SCANS, Options};
-use crate::pool::ask_each;
+use crate::options::{OF_DISTANCE, OF_SCANS, Options};
+use crate::pool::{ask, ask_each};
 use crate::poses::Poses;
 use crate::record::array;
 use crate::scan::Scan;
+use crate::shape::Shape;
+use crate::things::Mesh;
 
-/// Placed scans, each with an id.
+/// The bodies of a world.
+type Placed = Crowd<PreparedScan, PreparedMesh, Arc<Shape>>;
+
+/// Placed scans, meshes and shapes, each with an id.
 #[pyclass(frozen, module = "nearmiss")]
-#[derive(Debug, Default)]
-pub(crate) struct World(Mutex<Placed<Prepared>>);
+#[derive(Debug)]
+pub(crate) struct World(Mutex<Placed>);
+
+impl AsShape for Shape {
+    fn as_shape(&self) -> Convex<'_> {
+        self.convex()
+    }
+}
+
+/// The plans of questions about touches.
+struct Plans {
+    collide: CollidePlan,
+    /// Those about a scan and something else, if there is a scan.
+    of_scan: Option<(MeshScanPlan, ShapePlan)>,
+}
+
+impl Plans {
+    fn new(world: &Placed, options: &Options, metric: Metric) -> PyResult<Self> {
+        let collide = CollidePlan::of_metric(&options.collide, metric).map_err(refused)?;
+        let scan = world.ids().find_map(|id| world.placed(id));
+        let of_scan = scan.map(|scan| {
+            let of_mesh = MeshScanPlan::new(&options.collide, scan.scan())?;
+            Ok((of_mesh, ShapePlan::new(&options.collide, scan.scan())?))
+        });
+        Ok(Self { collide, of_scan: of_scan.transpose().map_err(|e: nearmiss::PlanError| refused(e))? })
+    }
+
+    /// Answers whether two bodies touch.
+    fn ask(&self, pair: &BodyPair<'_>, scratch: &mut Scratch) -> AnswerRecord {
+        let swapped = |record: AnswerRecord, is_swapped| if is_swapped { record.swapped() } else { record };
+        match (pair, &self.of_scan) {
+            (BodyPair::Scans(pair), _) => AnswerRecord::new(&pair.collide(&self.collide, scratch)),
+            (BodyPair::MeshAndScan { pair, mesh_is_first }, Some((plan, _))) => {
+                swapped(AnswerRecord::new(&pair.collide(plan, scratch)), *mesh_is_first)
+            }
+            (BodyPair::Meshes(pair), _) if self.collide.reach() == 0.0 => {
+                AnswerRecord::of_meshes(&pair.collide(scratch.meshes()))
+            }
+            (BodyPair::ShapeAndScan { pair, shape_is_first }, Some((_, plan))) => {
+                swapped(AnswerRecord::of_shape(&pair.touch(plan, scratch)), *shape_is_first)
+            }
+            _ => AnswerRecord::of_bodies(&pair.touch(&self.collide, scratch)),
+        }
+    }
+}
 
 fn no_body(id: u64) -> PyErr {
     PyKeyError::new_err(format!("expected the id of a body of this world, got {id}"))
 }
 
 impl World {
-    fn with<T>(&self, work: impl FnOnce(&mut Placed<Prepared>) -> T) -> T {
+    fn with<T>(&self, work: impl FnOnce(&mut Placed) -> T) -> T {
         let mut world = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         work(&mut world)
     }
 
+    /// A copy, which costs references: other threads can change the world meanwhile.
+    fn copy(&self) -> Placed {
+        self.with(|world| world.clone())
+    }
+
     fn pose(&self, id: u64, pose: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
         let poses = Poses::new(pose)?;
-        self.with(|world| poses.one(world.placed(BodyId(id)).ok_or_else(|| no_body(id))?.scan()))
+        self.with(|world| match world.body(BodyId(id)).ok_or_else(|| no_body(id))? {
+            PlacedBody::Scan(scan) => poses.one(scan.scan()),
+            PlacedBody::Mesh(mesh) => poses.one(mesh.mesh()),
+            PlacedBody::Shape(_) => poses.one_of_shape(),
+        })
     }
+}
+
+/// Returns the metric of the scans of a world, which must be the same.
+fn metric_of(world: &Placed) -> PyResult<Metric> {
+    let mut metrics = world.ids().filter_map(|id| Some((id, world.placed(id)?.scan().metric())));
+    let Some((_, first)) = metrics.next() else { return Ok(Metric::Euclidean) };
+    match metrics.find(|(_, metric)| *metric != first) {
+        Some((BodyId(id), _)) => {
+            Err(refused(format!("expected scans prepared for one kernel, got another one of body {id}")))
+        }
+        None => Ok(first),
+    }
+}
+
+/// Returns the plan of distances in a world.
+fn distance_plan(world: &Placed, given: Option<&Bound<'_, PyDict>>) -> PyResult<(DistancePlan, Options)> {
+    let metric = metric_of(world)?;
+    let options = Options::new(given, OF_DISTANCE, metric)?;
+    let asked =
+        DistanceOptions::default().with_semantics(options.collide.semantics).with_relative(options.relative);
+    Ok((DistancePlan::of_metric(&asked, metric).map_err(refused)?, options))
 }
 
 #[pymethods]
 impl World {
     #[new]
     fn new() -> Self {
-        Self::default()
+        Self(Mutex::new(Crowd::with_meshes_and_shapes()))
     }
 
     fn __len__(&self) -> usize {
@@ -49,7 +131,7 @@ impl World {
     }
 
     fn __repr__(&self) -> String {
-        format!("<World of {} scans>", self.__len__())
+        format!("<World of {} bodies>", self.__len__())
     }
 
     /// The ids of all bodies, in the order of insertion.
@@ -58,17 +140,32 @@ impl World {
         self.with(|world| world.ids().map(|id| id.0).collect())
     }
 
-    /// Place `scan` at `pose`, of shape (4, 4), and return the id of the new body.
-    #[pyo3(signature = (scan, pose = None))]
-    fn insert(&self, scan: &Bound<'_, Scan>, pose: Option<&Bound<'_, PyAny>>) -> PyResult<u64> {
-        let scan = &scan.get().0;
-        let pose = Poses::new(pose)?.one(&**scan)?;
-        Ok(self.with(|world| world.insert(scan.clone(), &pose).0))
+    /// Place a Scan, a Mesh or a Shape at `pose`, of shape (4, 4), and return the id of the new body.
+    #[pyo3(signature = (body, pose = None))]
+    fn insert(&self, body: &Bound<'_, PyAny>, pose: Option<&Bound<'_, PyAny>>) -> PyResult<u64> {
+        let poses = Poses::new(pose)?;
+        let id = if let Ok(scan) = body.cast::<Scan>() {
+            let scan = &scan.get().0;
+            let pose = poses.one(&**scan)?;
+            self.with(|world| world.insert(scan.clone(), &pose))
+        } else if let Ok(mesh) = body.cast::<Mesh>() {
+            let mesh = &mesh.get().mesh;
+            let pose = poses.one(mesh)?;
+            self.with(|world| world.insert_mesh(mesh.clone(), &pose))
+        } else if let Ok(shape) = body.cast::<Shape>() {
+            let (shape, pose) = (Arc::new(shape.get().clone()), poses.one_of_shape()?);
+            self.with(|world| world.insert_shape(shape, &pose))
+        } else {
+            let class = body.get_type().name()?;
+            let told = format!("expected a Scan, a Mesh or a Shape, got {class}");
+            return Err(PyTypeError::new_err(told));
+        };
+        Ok(id.0)
     }
 
     /// Remove a body. Raises `KeyError` for an unknown id.
     fn remove(&self, id: u64) -> PyResult<()> {
-        self.with(|world| world.remove(BodyId(id))).map(drop).ok_or_else(|| no_body(id))
+        self.with(|world| world.remove_body(BodyId(id))).map(drop).ok_or_else(|| no_body(id))
     }
 
     /// Move a body to `pose`, of shape (4, 4). Raises `KeyError` for an unknown id.
@@ -86,10 +183,8 @@ impl World {
         reach: f64,
         of: Option<Vec<u64>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        if reach.is_nan() || reach < 0.0 {
-            return Err(refused(format!("expected a reach of at least 0, got {reach}")));
-        }
-        let world = self.with(|world| world.clone());
+        check_reach(reach)?;
+        let world = self.copy();
         let pairs = near(py, &world, reach, of.as_deref());
         let flat: Vec<u64> = pairs.iter().flatten().map(|id| id.0).collect();
         rows(py, flat, &[pairs.len(), 2])
@@ -98,7 +193,8 @@ impl World {
     /// Answer `collide` for all pairs that may touch, or those with a body in the list `of`, on all cores.
     ///
     /// Returns the pairs of ids, of shape (N, 2), and a structured array of answers, of shape (N,), as
-    /// `Scan.collide_each` does. Options are those of `Scan.collide`.
+    /// `Scan.collide_each` does. Options are those of `Scan.collide`. Shapes are solid, and have no normals and
+    /// no sources.
     #[pyo3(signature = (of = None, **options))]
     fn collide<'py>(
         &self,
@@ -106,35 +202,83 @@ impl World {
         of: Option<Vec<u64>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        // A copy costs references of scans, and other threads can change the world meanwhile.
-        let world = self.with(|world| world.clone());
-        let Some(first) = world.ids().next().and_then(|id| world.placed(id)) else {
-            return Ok((rows(py, Vec::<u64>::new(), &[0, 2])?, array::<AnswerRecord>(py, Vec::new())?));
-        };
-        let options = Options::new(options, OF_SCANS, first.scan().metric())?;
-        let plan = CollidePlan::new(&options.collide, first.scan(), first.scan()).map_err(refused)?;
-        if let Some(id) = world
-            .ids()
-            .find(|&id| world.placed(id).is_some_and(|other| other.scan().metric() != first.scan().metric()))
-        {
-            return Err(refused(format!(
-                "expected scans prepared for one kernel, got another one of body {}",
-                id.0
-            )));
-        }
-        let pairs = near(py, &world, plan.reach(), of.as_deref());
+        let world = self.copy();
+        let metric = metric_of(&world)?;
+        let options = Options::new(options, OF_SCANS, metric)?;
+        let plans = Plans::new(&world, &options, metric)?;
+        let pairs = near(py, &world, plans.collide.reach(), of.as_deref());
         let answers = ask_each(py, pairs.len(), |i, scratch| {
-            let answer =
-                world.pair(pairs[i]).map(|pair| pair.within(&options.budget()).collide(&plan, scratch));
-            AnswerRecord::new(&answer.unwrap_or(nearmiss::Answer::UNASKED))
+            let pair = world.body_pair(pairs[i]).map(|pair| pair.within(&options.budget()));
+            let unasked = || AnswerRecord::new(&nearmiss::Answer::UNASKED);
+            pair.map_or_else(unasked, |pair| plans.ask(&pair, scratch))
         })?;
         let flat: Vec<u64> = pairs.iter().flatten().map(|id| id.0).collect();
         Ok((rows(py, flat, &[pairs.len(), 2])?, array(py, answers)?))
     }
+
+    /// Bound the distance of two bodies: lower ≤ distance ≤ upper. Returns a `Distance`, without sources.
+    /// Options are those of `Scan.distance`. Raises `KeyError` for an unknown id.
+    #[pyo3(signature = (a, b, **options))]
+    fn distance(
+        &self,
+        py: Python<'_>,
+        a: u64,
+        b: u64,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Distance> {
+        let world = self.copy();
+        let (plan, options) = distance_plan(&world, options)?;
+        if let Some(id) = [a, b].into_iter().find(|&id| world.body(BodyId(id)).is_none()) {
+            return Err(no_body(id));
+        }
+        let found = ask(py, |scratch| {
+            world.body_pair([BodyId(a), BodyId(b)])?.within(&options.budget()).distance(&plan, scratch)
+        });
+        Ok(Distance(found.map_or(DistanceRecord::UNKNOWN, |found| {
+            DistanceRecord::of_bodies((found.lower, found.upper), found.points)
+        })))
+    }
+
+    /// Find the two bodies that are nearest to each other, of those whose bounding boxes come within the
+    /// length `reach`. Pairs of ids in `ignore` do not count, such as neighbouring links of a robot.
+    ///
+    /// Returns the ids and a `Distance`, or None if no pair counts. The lower bound holds for all pairs.
+    #[pyo3(signature = (reach = f64::INFINITY, *, ignore = Vec::new(), of = None, **options))]
+    fn nearest(
+        &self,
+        py: Python<'_>,
+        reach: f64,
+        ignore: Vec<[u64; 2]>,
+        of: Option<Vec<u64>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Option<([u64; 2], Distance)>> {
+        check_reach(reach)?;
+        let world = self.copy();
+        let (plan, _) = distance_plan(&world, options)?;
+        let found = ask(py, |scratch| {
+            let ids: Option<Vec<BodyId>> = of.map(|ids| ids.into_iter().map(BodyId).collect());
+            let bodies = ids.as_deref().map_or(Bodies::All, Bodies::These);
+            let counts =
+                |a: BodyId, b: BodyId| !ignore.contains(&[a.0, b.0]) && !ignore.contains(&[b.0, a.0]);
+            world.nearest_pair(bodies, reach, counts, &plan, scratch)
+        });
+        Ok(found.map(|found| {
+            let record = DistanceRecord::of_bodies((found.lower, found.upper), found.points);
+            (found.ids.map(|id| id.0), Distance(record))
+        }))
+    }
+}
+
+/// Checks a reach.
+fn check_reach(reach: f64) -> PyResult<()> {
+    if reach.is_nan() || reach < 0.0 {
+        return Err(refused(format!("expected a reach of at least 0, got {reach}")));
+    }
+    Ok(())
 }
 
 /// Returns the pairs near each other, without the interpreter.
-fn near(py: Python<'_>, world: &Placed<Prepared>, reach: f64, of: Option<&[u64]>) -> Vec<[BodyId; 2]> {
+fn near(py: Python<'_>, world: &Placed, reach: f64, of: Option<&[u64]>) -> Vec<[BodyId; 2]> {
     py.detach(|| {
         let mut pairs = Vec::new();
         let ids: Option<Vec<BodyId>> = of.map(|ids| ids.iter().map(|&id| BodyId(id)).collect());

@@ -159,6 +159,58 @@ class Motions(unittest.TestCase):
                 call()
         self.assertEqual(nearmiss.World().collide()[0].shape, (0, 2))
 
+    def test_worlds_hold_meshes_and_shapes(self):
+        x, y = np.meshgrid(np.arange(50) * 0.02, np.arange(50) * 0.02)
+        floor = nearmiss.Scan(np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3))
+        corners = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.5], [-0.2, 0.0, 0.5]]
+        tip, ball = nearmiss.Mesh(corners, [[0, 1, 2]]), nearmiss.Shape.sphere([0, 0, 0], 0.1)
+        wedge = nearmiss.Shape.hull([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+        at = lambda *place: nearmiss.pose(translation=place)
+        world = nearmiss.World()
+        ground = world.insert(floor)
+        mesh = world.insert(tip, at(0.5, 0.5, -0.1))
+        low, high = world.insert(ball, at(0.2, 0.2, 0.09)), world.insert(ball, at(0.2, 0.2, 0.28))
+        hull = world.insert(wedge, at(0.5, 0.45, 0.35))
+        pairs, answers = world.collide()
+        found = {tuple(pair): answer for pair, answer in zip(pairs.tolist(), answers)}
+        touching = {pair for pair, answer in found.items() if answer["verdict"] == 1}
+        self.assertEqual(touching, {(ground, mesh), (ground, low), (low, high), (mesh, hull)})
+        on_floor = found[(ground, low)]
+        self.assertTrue(on_floor["source_a"] >= 0 and on_floor["source_b"] == -1)
+        self.assertAlmostEqual(on_floor["witness"][2], 0.0, 6)
+        self.assertAlmostEqual(found[(ground, mesh)]["witness"][2], 0.0, 6)
+        self.assertEqual((found[(low, high)]["evidence"], found[(low, high)]["band"]), (1, 0.0))
+
+        gap = world.distance(ground, high)
+        self.assertTrue(0.17 < gap.lower <= gap.upper and abs(gap.upper - 0.18) < 1e-6)
+        np.testing.assert_allclose([gap.point_a[2], gap.point_b[2]], [0.0, 0.18], atol=1e-6)
+        ids, nearest = world.nearest()
+        self.assertEqual(nearest.upper, 0.0)
+        ignore = [(low, ground), (ground, mesh), (low, high), (mesh, hull)]
+        ids, nearest = world.nearest(ignore=ignore)
+        self.assertEqual(list(ids), [ground, high])
+        self.assertAlmostEqual(nearest.upper, 0.18, 6)
+        self.assertIsNone(world.nearest(0.0, ignore=ignore, of=[high]))
+        self.assertEqual(world.collide(margin=0.2)[1]["verdict"].tolist().count(1), 5)
+        for a, b in ((ground, 99), (99, ground)):
+            with self.assertRaises(KeyError):
+                world.distance(a, b)
+        with self.assertRaisesRegex(TypeError, "a Scan, a Mesh or a Shape"):
+            world.insert(np.eye(3))
+        world.move_to(low, at(0.2, 0.2, 0.5))
+        self.assertEqual(len(world.collide(of=[low])[0]), 0)
+        world.remove(mesh)
+        with self.assertRaises(KeyError):
+            world.remove(mesh)
+
+        # A world without scans.
+        robot = nearmiss.World()
+        arm = robot.insert(nearmiss.Shape.capsule([0, 0, 0], [1, 0, 0], 0.1))
+        hand = robot.insert(ball, at(1.15, 0, 0))
+        self.assertEqual(robot.collide()[1]["verdict"].tolist(), [1])
+        robot.move_to(hand, at(1.5, 0, 0))
+        self.assertAlmostEqual(robot.distance(arm, hand).upper, 0.3, 6)
+
     def test_slice_maps(self):
         slices = nearmiss.SliceMap(room(), pixel=0.05)
         boxes = [[[2, 1, 0.5], [4, 3, 1.5]], [[0, 1, 0.5], [0.3, 3, 1.5]]]

@@ -343,8 +343,7 @@ pub enum PlanError {
 }
 
 /// The metric of both scans. Fails if they differ from each other or from `asked`.
-fn common_metric(asked: Option<Metric>, a: &PointHierarchy, b: &PointHierarchy) -> Result<Metric, PlanError> {
-    let stored = [a.metric(), b.metric()];
+fn common_metric(asked: Option<Metric>, stored: [Metric; 2]) -> Result<Metric, PlanError> {
     match asked {
         Some(asked) => match stored.into_iter().find(|&stored| stored != asked) {
             Some(stored) => Err(PlanError::Metric { asked, stored }),
@@ -410,6 +409,18 @@ impl CollidePlan {
     /// Names the option that is out of range, or the [metric](PointHierarchy::metric) that does not
     /// match. Balls about points are independent of the metric and match any.
     pub fn new(options: &CollideOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
+        Self::of_metrics(options, [a.metric(), b.metric()])
+    }
+
+    /// Validates `options` for any scans of a metric, such as those that a [world](crate::World) will have.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_metric(options: &CollideOptions, metric: Metric) -> Result<Self, PlanError> {
+        Self::of_metrics(options, [metric; 2])
+    }
+
+    pub(crate) fn of_metrics(options: &CollideOptions, metrics: [Metric; 2]) -> Result<Self, PlanError> {
         let is_length = |l: f64| l >= 0.0 && l.is_finite();
         match options.semantics {
             Semantics::Thickened(r) if !is_length(r) => return Err(PlanError::Radius(r)),
@@ -423,7 +434,7 @@ impl CollidePlan {
             options.semantics = Semantics::Surface;
         }
         if options.semantics.is_of_surfaces() {
-            let metric = common_metric(options.metric, a, b)?;
+            let metric = common_metric(options.metric, metrics)?;
             options.metric = Some(metric);
             if metric == Metric::Geodesic {
                 options.evidence = Evidence::Estimated;

@@ -80,7 +80,7 @@ impl BodyAnswer {
 impl BodyPair<'_> {
     /// Decides whether the bodies touch, or are within the margin of `plan`.
     ///
-    /// `plan` is for any two scans of the world. It gives scans their meaning; meshes and shapes are exact, and
+    /// `plan` is for any two scans of the world, or for their metric ([`CollidePlan::of_metric`]). It gives scans their meaning; meshes and shapes are exact, and
     /// shells: what is inside without touching is separate, except that a shape is solid. The method, order and
     /// coverings of the plan count for two scans only. See [`Pair::collide`](crate::Pair::collide),
     /// [`MeshScanPair::collide`](crate::MeshScanPair::collide), [`MeshPair::collide`],
@@ -96,7 +96,7 @@ impl BodyPair<'_> {
     /// let points: Vec<[f32; 3]> =
     ///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
     /// let floor = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
-    /// let plan = CollidePlan::new(&CollideOptions::default(), &floor, &floor)?;
+    /// let plan = CollidePlan::of_metric(&CollideOptions::default(), floor.metric())?;
     ///
     /// // A ball in a floor, and one on top of it.
     /// let mut world = World::with_shapes();
