@@ -6,6 +6,7 @@ use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{PlaceVisitor, Siblings};
+use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::Bits;
 
 use crate::ask::answer::{Evidence, Reason};
@@ -32,8 +33,11 @@ struct Met {
 /// The parts that a shape was found to touch.
 #[derive(Debug, Clone, Copy)]
 struct Findings {
-    /// The first discs that touch.
-    met: [Option<Met>; TRIES],
+    /// The first disc that touches.
+    met: Option<Met>,
+    /// The points of the next discs that touch.
+    others: [u32; TRIES - 1],
+    /// The number of all of these.
     count: usize,
     certified: Option<Met>,
     /// `true` if the shape is near a point about which nothing is known.
@@ -75,8 +79,14 @@ pub(crate) fn touch(
 }
 
 impl Findings {
-    const NONE: Self =
-        Self { met: [None; TRIES], count: 0, certified: None, undersampled: false, doubtful: false };
+    const NONE: Self = Self {
+        met: None,
+        others: [0; TRIES - 1],
+        count: 0,
+        certified: None,
+        undersampled: false,
+        doubtful: false,
+    };
 
     /// Compares the shape with the part of a point, and with the point itself.
     fn examine(&mut self, elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> ControlFlow<()> {
@@ -98,10 +108,12 @@ impl Findings {
             self.certified = Some(met);
             return ControlFlow::Break(());
         }
-        if self.count < TRIES {
-            self.met[self.count] = Some(met);
-            self.count += 1;
+        if self.count == 0 {
+            self.met = Some(met);
+        } else if self.count < TRIES {
+            self.others[self.count - 1] = id32(i);
         }
+        self.count += usize::from(self.count < TRIES);
         if elements.detail == Detail::Verdict {
             return ControlFlow::Break(());
         }
@@ -123,11 +135,15 @@ impl Findings {
         if let Some(met) = self.certified {
             return touching(met, elements.in_world(&met.point), Evidence::Certified);
         }
-        if let Some(first) = self.met[0] {
+        if let Some(first) = self.met {
             if elements.detail == Detail::Witness {
-                for met in self.met.iter().flatten() {
+                let others = self.others[..self.count - 1].iter().filter_map(|&i| {
+                    let i = i as usize;
+                    elements.reached(solid, i).map(|point| Met { i, point })
+                });
+                for met in std::iter::once(first).chain(others) {
                     if let Some(point) = verified_in(elements, solid, (met.i, met.point), scratch) {
-                        return touching(*met, point, Evidence::Certified);
+                        return touching(met, point, Evidence::Certified);
                     }
                 }
             }
