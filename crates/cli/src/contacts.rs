@@ -113,7 +113,9 @@ impl Grouped {
             let [x, y, z] = group.size().map(short);
             let contacts = count(group.contacts.len() as u64, "contact");
             let depth = self.depths.get(number - 1).filter(|depth| depth.upper.is_finite());
-            let depth = depth.map_or_else(String::new, |depth| format!(", {} deep", short(depth.upper)));
+            let depth = depth.map_or_else(String::new, |depth| {
+                format!(", {}{} deep", if depth.complete { "" } else { "at most " }, short(depth.upper))
+            });
             format!(
                 "  clash {number}: {contacts} about {}, {x} × {y} × {z}{depth}",
                 place(group.centre(), unit)
@@ -151,6 +153,9 @@ pub(crate) struct GroupReport {
     depth: Option<f64>,
     depth_lower: Option<f64>,
     depth_direction: Option<[f64; 3]>,
+    /// `false` if the budget ended the search for the depth; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    depth_complete: Option<bool>,
     /// The place of the contact with the least residual.
     point: [f64; 3],
     residual: f64,
@@ -170,6 +175,7 @@ impl GroupReport {
             depth: depth.map(|depth| depth.upper),
             depth_lower: depth.map(|depth| depth.lower),
             depth_direction: depth.map(|depth| depth.direction),
+            depth_complete: depth.filter(|depth| !depth.complete).map(|_| false),
             point: nearest.point,
             residual: nearest.residual,
             source_a: nearest.sources[0].0,

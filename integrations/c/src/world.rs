@@ -38,11 +38,11 @@ pub struct BodyPair {
     pub b: u64,
 }
 
-/// Bounds on the distance of two bodies. Infinite if it is not known.
+/// Bounds on the distance of two bodies. If it is not known, the bounds are infinite and the places NaN.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct BodyDistance {
-    /// The bodies, the smaller id first; `UINT64_MAX` if there are none.
+    /// The bodies, in the order of the question, or the smaller id first; `UINT64_MAX` if there are none.
     pub pair: BodyPair,
     /// A proven lower bound.
     pub lower: f64,

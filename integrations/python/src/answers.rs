@@ -228,14 +228,14 @@ impl DistanceRecord {
         node_pairs: 0,
         leaf_pairs: 0,
         evidence: -1,
-        complete: 1,
+        complete: 0,
         _padding: [0; 6],
     };
 
-    /// The record of the distance of two bodies, which is proven.
+    /// The record of the distance of two bodies, of which the lower bound is proven.
     pub(crate) fn of_bodies((lower, upper): (f64, f64), [point_a, point_b]: [[f64; 3]; 2]) -> Self {
         let evidence = evidence_code(Evidence::Certified);
-        Self { point_a, point_b, lower, upper, evidence, ..Self::UNKNOWN }
+        Self { point_a, point_b, lower, upper, evidence, complete: 1, ..Self::UNKNOWN }
     }
 
     pub(crate) fn new(distance: &nearmiss::Distance) -> Self {

@@ -35,6 +35,9 @@ pub(crate) const OF_BUDGET: &[&str] = &["work", "seconds"];
 /// The names of options for a distance.
 pub(crate) const OF_DISTANCE: &[&str] = &["thickened", "surface_only", "relative", "work", "seconds"];
 
+/// The names of options for the nearest pair of a world.
+pub(crate) const OF_NEAREST: &[&str] = &["thickened", "surface_only", "relative"];
+
 /// The names of options for shapes and rays.
 pub(crate) const OF_SHAPES: &[&str] = &["margin", "thickened", "surface_only", "evidence", "detail"];
 

@@ -14,7 +14,7 @@ use pyo3::types::PyDict;
 use crate::answers::{AnswerRecord, Distance, DistanceRecord, PairRecord as _};
 use crate::cloud::rows;
 use crate::failure::refused;
-use crate::options::{OF_DISTANCE, OF_SCANS, Options};
+use crate::options::{OF_DISTANCE, OF_NEAREST, OF_SCANS, Options};
 use crate::pool::{ask, ask_each};
 use crate::poses::Poses;
 use crate::record::array;
@@ -111,9 +111,13 @@ fn metric_of(world: &Placed) -> PyResult<Metric> {
 }
 
 /// Returns the plan of distances in a world.
-fn distance_plan(world: &Placed, given: Option<&Bound<'_, PyDict>>) -> PyResult<(DistancePlan, Options)> {
+fn distance_plan(
+    world: &Placed,
+    given: Option<&Bound<'_, PyDict>>,
+    names: &[&str],
+) -> PyResult<(DistancePlan, Options)> {
     let metric = metric_of(world)?;
-    let options = Options::new(given, OF_DISTANCE, metric)?;
+    let options = Options::new(given, names, metric)?;
     let asked =
         DistanceOptions::default().with_semantics(options.collide.semantics).with_relative(options.relative);
     Ok((DistancePlan::of_metric(&asked, metric).map_err(refused)?, options))
@@ -216,8 +220,9 @@ impl World {
         Ok((rows(py, flat, &[pairs.len(), 2])?, array(py, answers)?))
     }
 
-    /// Bound the distance of two bodies: lower ≤ distance ≤ upper. Returns a `Distance`, without sources.
-    /// Options are those of `Scan.distance`. Raises `KeyError` for an unknown id.
+    /// Bound the distance of two bodies: lower ≤ distance ≤ upper. Returns a `Distance`, without sources and a
+    /// band for shapes. Options are those of `Scan.distance`; `work` and `seconds` do not limit pairs with a
+    /// shape. Raises `KeyError` for an unknown id.
     #[pyo3(signature = (a, b, **options))]
     fn distance(
         &self,
@@ -227,22 +232,20 @@ impl World {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Distance> {
         let world = self.copy();
-        let (plan, options) = distance_plan(&world, options)?;
+        let (plan, options) = distance_plan(&world, options, OF_DISTANCE)?;
         if let Some(id) = [a, b].into_iter().find(|&id| world.body(BodyId(id)).is_none()) {
             return Err(no_body(id));
         }
-        let found = ask(py, |scratch| {
-            world.body_pair([BodyId(a), BodyId(b)])?.within(&options.budget()).distance(&plan, scratch)
-        });
-        Ok(Distance(found.map_or(DistanceRecord::UNKNOWN, |found| {
-            DistanceRecord::of_bodies((found.lower, found.upper), found.points)
-        })))
+        let pair = world.body_pair([BodyId(a), BodyId(b)]).ok_or_else(|| no_body(a))?;
+        let pair = pair.within(&options.budget());
+        Ok(Distance(ask(py, |scratch| distance(&pair, &plan, scratch))))
     }
 
     /// Find the two bodies that are nearest to each other, of those whose bounding boxes come within the
     /// length `reach`. Pairs of ids in `ignore` do not count, such as neighbouring links of a robot.
     ///
-    /// Returns the ids and a `Distance`, or None if no pair counts. The lower bound holds for all pairs.
+    /// Returns the ids and a `Distance` without sources and a band, or None if no pair counts. The lower bound
+    /// holds for all pairs. Options are `thickened`, `surface_only` and `relative`.
     #[pyo3(signature = (reach = f64::INFINITY, *, ignore = Vec::new(), of = None, **options))]
     fn nearest(
         &self,
@@ -254,7 +257,7 @@ impl World {
     ) -> PyResult<Option<([u64; 2], Distance)>> {
         check_reach(reach)?;
         let world = self.copy();
-        let (plan, _) = distance_plan(&world, options)?;
+        let (plan, _) = distance_plan(&world, options, OF_NEAREST)?;
         let found = ask(py, |scratch| {
             let ids: Option<Vec<BodyId>> = of.map(|ids| ids.into_iter().map(BodyId).collect());
             let bodies = ids.as_deref().map_or(Bodies::All, Bodies::These);
@@ -266,6 +269,21 @@ impl World {
             let record = DistanceRecord::of_bodies((found.lower, found.upper), found.points);
             (found.ids.map(|id| id.0), Distance(record))
         }))
+    }
+}
+
+/// Bounds the distance of two bodies.
+fn distance(pair: &BodyPair<'_>, plan: &DistancePlan, scratch: &mut Scratch) -> DistanceRecord {
+    match pair {
+        BodyPair::Scans(pair) => DistanceRecord::new(&pair.distance(plan, scratch)),
+        BodyPair::MeshAndScan { pair, mesh_is_first } => {
+            let found = DistanceRecord::new(&pair.distance(plan, scratch));
+            if *mesh_is_first { found.swapped() } else { found }
+        }
+        BodyPair::Meshes(pair) => DistanceRecord::of_meshes(&pair.distance(scratch.meshes())),
+        _ => pair.distance(plan, scratch).map_or(DistanceRecord::UNKNOWN, |found| {
+            DistanceRecord::of_bodies((found.lower, found.upper), found.points)
+        }),
     }
 }
 

@@ -192,6 +192,10 @@ class Motions(unittest.TestCase):
         self.assertAlmostEqual(nearest.upper, 0.18, 6)
         self.assertIsNone(world.nearest(0.0, ignore=ignore, of=[high]))
         self.assertEqual(world.collide(margin=0.2)[1]["verdict"].tolist().count(1), 5)
+        hasty = world.distance(ground, mesh, work=1)
+        self.assertEqual((hasty.complete, hasty.upper >= hasty.lower), (tip.distance(floor, work=1).complete, True))
+        with self.assertRaisesRegex(TypeError, "`seconds`"):
+            world.nearest(seconds=1)
         for a, b in ((ground, 99), (99, ground)):
             with self.assertRaises(KeyError):
                 world.distance(a, b)

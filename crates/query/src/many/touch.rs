@@ -80,10 +80,11 @@ impl BodyAnswer {
 impl BodyPair<'_> {
     /// Decides whether the bodies touch, or are within the margin of `plan`.
     ///
-    /// `plan` is for any two scans of the world, or for their metric ([`CollidePlan::of_metric`]). It gives scans their meaning; meshes and shapes are exact, and
-    /// shells: what is inside without touching is separate, except that a shape is solid. The method, order and
-    /// coverings of the plan count for two scans only. See [`Pair::collide`](crate::Pair::collide),
-    /// [`MeshScanPair::collide`](crate::MeshScanPair::collide), [`MeshPair::collide`],
+    /// `plan` is for any two scans of the world, or for their metric ([`CollidePlan::of_metric`]). It gives
+    /// scans their meaning. Meshes and shapes are exact. A shape is solid. A mesh is a shell: what is inside
+    /// without touching it is separate. The method, order and coverings of the plan count for two scans only.
+    /// See [`Pair::collide`](crate::Pair::collide), [`MeshScanPair::collide`](crate::MeshScanPair::collide),
+    /// [`MeshPair::collide`],
     /// [`ShapeScanPair::touch`](crate::ShapeScanPair::touch),
     /// [`ShapeMeshPair::distance`](crate::ShapeMeshPair::distance) and
     /// [`ShapePair::distance`](crate::ShapePair::distance). Does not allocate once `scratch` is warm.
@@ -131,14 +132,12 @@ impl BodyPair<'_> {
                 BodyAnswer { verdict, band: answer.band }
             }
             Self::ShapeAndMesh { pair, .. } => {
-                let is_valid = pair.shape().bounds().is_some() && is_proper(pair.mesh().stored_to_world());
+                let evidence = Evidence::Certified;
                 match pair.distance(margin, scratch) {
                     Some(found) => BodyAnswer::exact((found.lower, found.upper), found.points, margin),
-                    None if is_valid => {
-                        let evidence = Evidence::Certified;
-                        BodyAnswer { verdict: BodyVerdict::Separated { evidence }, band: 0.0 }
-                    }
-                    None => BodyAnswer::invalid(Reason::Shape),
+                    None if !is_proper(pair.mesh().stored_to_world()) => BodyAnswer::invalid(Reason::Pose),
+                    None if pair.shape().bounds().is_none() => BodyAnswer::invalid(Reason::Shape),
+                    None => BodyAnswer { verdict: BodyVerdict::Separated { evidence }, band: 0.0 },
                 }
             }
             Self::Shapes(pair) => pair.distance().map_or(BodyAnswer::invalid(Reason::Shape), |found| {

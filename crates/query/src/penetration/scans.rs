@@ -50,13 +50,11 @@ pub(crate) struct Piece<'s> {
     pub(crate) part: Placed<'s>,
     /// The whole scan, whose surface encloses the solid.
     pub(crate) whole: Placed<'s>,
-    /// Points of the part. Where surfaces do not meet, they tell whether the part is inside another scan.
-    pub(crate) points: [Vector; TESTED],
 }
 
 impl<'s> Piece<'s> {
     fn whole(scan: &Placed<'s>) -> Self {
-        Self { part: *scan, whole: *scan, points: some_points(scan) }
+        Self { part: *scan, whole: *scan }
     }
 }
 
@@ -92,7 +90,7 @@ pub(crate) fn of_pieces<'s>(
         scans,
         elements,
         wholes,
-        points: pieces.map(|piece| piece.points),
+        points: scans.each_ref().map(some_points),
         solid,
         plan: plan.of_verdicts(),
         budget: Budget { resolution: None, ..*budget },
@@ -143,7 +141,8 @@ impl ScanProbe<'_> {
         let (balls, plan) = (self.elements.each_ref().map(world_ball), self.plan);
         out_of_balls(balls, plan.options().margin, |t| {
             let answer = self.collide_with(t, &plan, Outputs::default(), &Budget::UNLIMITED);
-            answer.verdict.is_separated()
+            // A part may be inside the solid even far from the other part.
+            answer.verdict.is_separated() && !self.is_nested(t)
         })
     }
 
@@ -157,6 +156,11 @@ impl ScanProbe<'_> {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
             contains(&self.wholes[k], &(place + shift), working)
         })
+    }
+
+    /// Returns `true` if something is inside a solid after a shift that separates the surfaces.
+    fn is_nested(&mut self, t: Vector) -> bool {
+        (0..2).any(|k| self.solid[k] && self.has_part_inside(k, t))
     }
 
     /// Breaks if the budget is spent.
@@ -195,8 +199,7 @@ impl ScanProbe<'_> {
 impl Probe for ScanProbe<'_> {
     fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
         let answer = self.collide(t, Outputs::default())?;
-        let is_nested = |probe: &mut Self, k: usize| probe.solid[k] && probe.has_part_inside(k, t);
-        ControlFlow::Continue(answer.verdict.is_separated() && !is_nested(self, 0) && !is_nested(self, 1))
+        ControlFlow::Continue(answer.verdict.is_separated() && !self.is_nested(t))
     }
 
     /// The direction is that of the normal that is nearest to the shift.

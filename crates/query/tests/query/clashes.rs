@@ -5,7 +5,8 @@ use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
     Budget, Clash, ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions, CollidePlan, Contact,
-    ContactGroup, Contacts, Detail, Interior, Pair, Penetration, Placed, PlanError, Scratch, Semantics,
+    ContactGroup, Contacts, Deadline, Detail, Interior, Pair, Penetration, Placed, PlanError, Scratch,
+    Semantics,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle;
@@ -242,11 +243,11 @@ fn each_clash_has_the_depth_of_its_own_place() {
     const HOLLOW: Interior = Interior::Hollow;
     const SOLID: Interior = Interior::Solid;
     let rows = [0.02, 0.05, 0.1, 0.15, 0.25, 0.3];
-    let floor = scene(&[(patch(7.0, 2.0), Pose::IDENTITY)], SPACING);
+    let floor = scene(&[(patch(14.0, 2.0), Pose::IDENTITY)], SPACING);
     // Balls of radius 0.3, sunk to these depths. The way out of a floor is up or down.
     let balls: Vec<(Form, Pose)> = (0_u32..)
         .zip(rows)
-        .map(|(i, depth)| (sphere(0.3), Pose::from_translation([f64::from(i) - 2.5, 0.0, 0.3 - depth])))
+        .map(|(i, depth)| (sphere(0.3), Pose::from_translation([2.0 * f64::from(i) - 5.0, 0.0, 0.3 - depth])))
         .collect();
     let balls = scene(&balls, SPACING);
     let radius = balls.sampling_radius().max(floor.sampling_radius());
@@ -273,12 +274,12 @@ fn each_clash_has_the_depth_of_its_own_place() {
 
     // Balls of radius 0.2 in the top of a block. Most of the third is below: it is pulled out of a solid, and
     // pushed into a shell.
-    let block = scene(&[(cuboid([3.0, 1.0, 1.0]), Pose::IDENTITY)], SPACING);
+    let block = scene(&[(cuboid([6.0, 1.0, 1.0]), Pose::IDENTITY)], SPACING);
     let top = block.bounds().max[2];
     let sunk = [0.05, 0.15, 0.3];
     let balls: Vec<(Form, Pose)> = (-1_i32..)
         .zip(sunk)
-        .map(|(i, depth)| (sphere(0.2), Pose::from_translation([0.8 * f64::from(i), 0.0, top + 0.2 - depth])))
+        .map(|(i, depth)| (sphere(0.2), Pose::from_translation([2.0 * f64::from(i), 0.0, top + 0.2 - depth])))
         .collect();
     let balls = scene(&balls, SPACING);
     let (a, b) = (Placed::new(&block, &Pose::IDENTITY), Placed::new(&balls, &Pose::IDENTITY));
@@ -293,6 +294,66 @@ fn each_clash_has_the_depth_of_its_own_place() {
             );
         }
     }
+}
+
+/// The parts around a clash hold the points of its contacts, however far the places of these are; lower bounds
+/// are those of each clash; and what leaves one surface of a solid must leave the solid.
+#[test]
+fn depths_of_balls_about_points_and_of_a_hollow_block() {
+    let floor = scene(&[(patch(3.0, 1.5), Pose::IDENTITY)], 0.03);
+    let at = |x: f64, z: f64| (sphere(0.3), Pose::from_translation([x, 0.0, z]));
+    let balls = scene(&[at(-0.75, 0.05), at(0.75, 0.8)], 0.03);
+    let (a, b) = (Placed::new(&floor, &Pose::IDENTITY), Placed::new(&balls, &Pose::IDENTITY));
+    let options = ClashOptions::default().with_semantics(Semantics::Thickened(0.3));
+    let told = depths(&list(&a, &b, &options.with_depths([Interior::Hollow; 2])));
+    assert_eq!(told.len(), 2, "{told:?}");
+    // Balls of radius 0.3 about the points meet up to a distance of 0.6.
+    for ((_, found), exact) in told.iter().zip([0.85, 0.1]) {
+        assert!((found.upper - exact).abs() < 0.03 && found.lower <= exact + 0.01, "{exact}: {found:?}");
+        assert!(found.direction[2] > 0.9, "{exact}: {found:?}");
+    }
+
+    let block = scene(&[(cuboid([4.0; 3]), Pose::IDENTITY), (sphere(0.5), Pose::IDENTITY)], 0.06);
+    let ball = scene(&[(sphere(0.5), Pose::IDENTITY)], 0.06);
+    let pose = Pose::from_translation([0.1, 0.0, 0.0]);
+    let (a, b) = (Placed::new(&block, &Pose::IDENTITY), Placed::new(&ball, &pose));
+    let solid = [Interior::Solid, Interior::Hollow];
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &block, &ball).unwrap();
+    let whole = Pair::new(a, b).penetration(&plan, solid, &mut Scratch::default());
+    for (_, found) in depths(&list(&a, &b, &ClashOptions::default().with_depths(solid))) {
+        assert!(found.upper > 2.3 && found.upper <= whole.upper, "out of the block: {found:?} {whole:?}");
+    }
+}
+
+#[test]
+fn depths_end_with_their_budget() {
+    let floor = scene(&[(patch(6.0, 2.0), Pose::IDENTITY)], 0.03);
+    let place =
+        |i: u32| Pose::from_translation([0.25 * f64::from(i % 20) - 2.4, 0.25 * f64::from(i / 20), 0.0]);
+    let balls: Vec<(Form, Pose)> = (0..60).map(|i| (sphere(0.08), place(i))).collect();
+    let balls = scene(&balls, 0.03);
+    let pair = Pair::new(Placed::new(&floor, &Pose::IDENTITY), Placed::new(&balls, &Pose::IDENTITY));
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &floor, &balls).unwrap();
+    let mut contacts = Contacts::default();
+    let scratch = &mut Scratch::default();
+    pair.contacts(&mut contacts).collide(&plan, scratch);
+    let groups = ContactGroup::all(&contacts.contacts, 0.05);
+    assert!(groups.len() >= 60, "{}", groups.len());
+    let groups: Vec<&ContactGroup> = groups.iter().collect();
+    let asked = (contacts.contacts.as_slice(), groups.as_slice());
+    let deadline = Deadline::within(std::time::Duration::from_micros(1));
+    let hasty = pair.within(&Budget::UNLIMITED.with_deadline(deadline));
+    let mut shares = Vec::new();
+    let found = hasty.depths(asked, (&plan, [Interior::Hollow; 2]), scratch, &mut |share| shares.push(share));
+    assert!(shares.last() == Some(&1.0) && shares.is_sorted(), "{shares:?}");
+    // No part is prepared: all answers are those of the whole scans.
+    assert!(found.iter().all(|depth| depth == &found[0] && !depth.complete), "{found:?}");
+    let found = pair.depths(asked, (&plan, [Interior::Hollow; 2]), scratch, &mut |_| ());
+    assert!(found.iter().all(|depth| depth.complete && depth.upper < 0.2), "{found:?}");
+    // Groups may be the caller's own.
+    let strange = ContactGroup { contacts: vec![usize::MAX], ..groups[0].clone() };
+    let odd = pair.depths((asked.0, &[&strange]), (&plan, [Interior::Hollow; 2]), scratch, &mut |_| ());
+    assert!(odd[0].upper.is_finite(), "{odd:?}");
 }
 
 #[test]

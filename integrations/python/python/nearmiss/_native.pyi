@@ -57,6 +57,9 @@ class _MeshOptions(_BudgetOptions, total=False):
 class _DistanceOptions(_SweepOptions, total=False):
     relative: float
 
+class _NearestOptions(_MeaningOptions, total=False):
+    relative: float
+
 class Answer:
     def __bool__(self) -> NoReturn: ...
     @property
@@ -461,7 +464,7 @@ class World:
         *,
         ignore: Sequence[Sequence[int]] = ...,
         of: Sequence[int] | None = None,
-        **options: Unpack[_DistanceOptions],
+        **options: Unpack[_NearestOptions],
     ) -> tuple[list[int], Distance] | None: ...
 
 class SliceMap:
