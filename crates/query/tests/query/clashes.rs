@@ -245,11 +245,12 @@ fn each_clash_has_the_depth_of_its_own_place() {
     let rows = [0.02, 0.05, 0.1, 0.15, 0.25, 0.3];
     let floor = scene(&[(patch(14.0, 2.0), Pose::IDENTITY)], SPACING);
     // Balls of radius 0.3, sunk to these depths. The way out of a floor is up or down.
-    let balls: Vec<(Form, Pose)> = (0_u32..)
-        .zip(rows)
-        .map(|(i, depth)| (sphere(0.3), Pose::from_translation([2.0 * f64::from(i) - 5.0, 0.0, 0.3 - depth])))
-        .collect();
-    let balls = scene(&balls, SPACING);
+    let row = |apart: f64| {
+        let place = |i: u32, depth: f64| [apart * (f64::from(i) - 2.5), 0.0, 0.3 - depth];
+        let balls = (0..).zip(rows).map(|(i, depth)| (sphere(0.3), Pose::from_translation(place(i, depth))));
+        scene(&balls.collect::<Vec<_>>(), SPACING)
+    };
+    let (balls, narrow) = (row(2.0), row(0.85));
     let radius = balls.sampling_radius().max(floor.sampling_radius());
     for (turn, scale) in [(0.0, 1.0), (0.7, 20.0)] {
         let frame = Pose::from_axis_angle([0.0, 0.0, turn], turn).with_scale(scale);
@@ -259,6 +260,12 @@ fn each_clash_has_the_depth_of_its_own_place() {
         for ((_, found), depth) in told.iter().zip(rows) {
             assert!((found.upper / scale - depth).abs() < radius, "{depth}: {found:?}");
             assert!(found.direction.map(f64::abs)[2] > 0.8, "{depth}: {found:?}");
+        }
+        // Neighbours are no pieces of a clash.
+        let near = Placed::new(&narrow, &frame);
+        let told = depths(&list(&a, &near, &ClashOptions::default().with_depths([HOLLOW; 2])));
+        for ((_, found), depth) in told.iter().zip(rows) {
+            assert!((found.upper / scale - depth).abs() < radius, "{depth}: {found:?}");
         }
         // As surfaces of solids, the balls have lower bounds.
         let told = depths(&list(&a, &b, &ClashOptions::default().with_depths([HOLLOW, SOLID])));
@@ -313,15 +320,26 @@ fn depths_of_balls_about_points_and_of_a_hollow_block() {
         assert!(found.direction[2] > 0.9, "{exact}: {found:?}");
     }
 
-    let block = scene(&[(cuboid([4.0; 3]), Pose::IDENTITY), (sphere(0.5), Pose::IDENTITY)], 0.06);
-    let ball = scene(&[(sphere(0.5), Pose::IDENTITY)], 0.06);
+    // A lower bound of all clashes is none of one, also if the budget ends the search for that.
+    for work in [100, 300, 1000, 2000, 3000, 5000, 10_000, 20_000] {
+        let plan = ClashPlan::new(&options.with_depths([Interior::Hollow; 2]), &floor, &balls).unwrap();
+        let pair = Pair::new(a, b).within(&Budget::UNLIMITED.with_work(work));
+        let told = depths(&pair.clashes(&plan, &mut Scratch::default()));
+        for (x, found) in told.iter().filter(|_| told.len() == 2) {
+            assert!(found.lower <= if *x < 0.0 { 0.86 } else { 0.11 }, "{work}: {told:?}");
+        }
+    }
+
+    // A ball in a small hollow of a large block, whose outer faces are not near the contacts.
+    let block = scene(&[(cuboid([12.0; 3]), Pose::IDENTITY), (sphere(0.5), Pose::IDENTITY)], 0.1);
+    let ball = scene(&[(sphere(0.5), Pose::IDENTITY)], 0.1);
     let pose = Pose::from_translation([0.1, 0.0, 0.0]);
     let (a, b) = (Placed::new(&block, &Pose::IDENTITY), Placed::new(&ball, &pose));
     let solid = [Interior::Solid, Interior::Hollow];
     let plan = CollidePlan::new(&CollideOptions::estimated(), &block, &ball).unwrap();
     let whole = Pair::new(a, b).penetration(&plan, solid, &mut Scratch::default());
     for (_, found) in depths(&list(&a, &b, &ClashOptions::default().with_depths(solid))) {
-        assert!(found.upper > 2.3 && found.upper <= whole.upper, "out of the block: {found:?} {whole:?}");
+        assert!(found.upper > 6.3 && found.upper <= whole.upper, "out of the block: {found:?} {whole:?}");
     }
 }
 
@@ -344,12 +362,15 @@ fn depths_end_with_their_budget() {
     let deadline = Deadline::within(std::time::Duration::from_micros(1));
     let hasty = pair.within(&Budget::UNLIMITED.with_deadline(deadline));
     let mut shares = Vec::new();
+    let start = std::time::Instant::now();
     let found = hasty.depths(asked, (&plan, [Interior::Hollow; 2]), scratch, &mut |share| shares.push(share));
+    let in_haste = start.elapsed();
     assert!(shares.last() == Some(&1.0) && shares.is_sorted(), "{shares:?}");
     // No part is prepared: all answers are those of the whole scans.
     assert!(found.iter().all(|depth| depth == &found[0] && !depth.complete), "{found:?}");
     let found = pair.depths(asked, (&plan, [Interior::Hollow; 2]), scratch, &mut |_| ());
     assert!(found.iter().all(|depth| depth.complete && depth.upper < 0.2), "{found:?}");
+    assert!(in_haste < 2 * (start.elapsed() - in_haste), "{in_haste:?}");
     // Groups may be the caller's own.
     let strange = ContactGroup { contacts: vec![usize::MAX], ..groups[0].clone() };
     let odd = pair.depths((asked.0, &[&strange]), (&plan, [Interior::Hollow; 2]), scratch, &mut |_| ());
