@@ -266,7 +266,8 @@ impl<'a> Views<'a> {
         }
     }
 
-    /// Returns how far b must move out of each group of contacts, for two scans; nothing for a mesh and a scan.
+    /// Returns how far b must move out of each group of contacts, for two scans; nothing for a mesh and a
+    /// scan.
     pub(crate) fn depths(
         &self,
         plan: &Plan,

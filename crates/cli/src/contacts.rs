@@ -82,7 +82,7 @@ pub(crate) struct Grouped {
     pub(crate) groups: Vec<ContactGroup>,
     /// The number of the clash of each contact, counted from 1.
     pub(crate) numbers: Vec<u32>,
-    /// How far b must move out of each clash; empty unless asked for.
+    /// The shifts of b out of each clash; empty unless asked for.
     pub(crate) depths: Vec<Penetration>,
 }
 
@@ -149,7 +149,7 @@ pub(crate) struct GroupReport {
     centre: [f64; 3],
     size: [f64; 3],
     bounds: [[f64; 3]; 2],
-    /// How far b must move out of the clash, at least and at most, and in which direction. Null unless asked for.
+    /// The length of the move of b out of the clash. Null unless asked for.
     depth: Option<f64>,
     depth_lower: Option<f64>,
     depth_direction: Option<[f64; 3]>,

@@ -186,8 +186,8 @@ pub struct Clash {
     /// The evidence for [`Self::upper`]. Certified: two measured points, or the balls about them,
     /// are that near. Estimated: tangent discs are.
     pub evidence: Evidence,
-    /// How far, and in which direction, to shift b out of the clash: see [`Pair::depths`]. `None` in a clearance
-    /// clash, and if the options do not ask for it.
+    /// How far, and in which direction, to shift b out of the clash: see [`Pair::depths`]. `None` in a
+    /// clearance clash, and if the options do not ask for it.
     pub depth: Option<Penetration>,
 }
 
@@ -203,8 +203,8 @@ pub struct Clashes {
     pub hard: usize,
     /// The link length, in world units.
     pub link: f64,
-    /// `true` if the searches ended within the budget, so that no clash is missing. Each depth tells for itself
-    /// whether its search did.
+    /// `true` if the searches ended within the budget, so that no clash is missing. Each depth tells for
+    /// itself whether its search did.
     pub complete: bool,
     /// The answers of the search for contacts and, with a clearance above zero, of the search
     /// within the clearance.

@@ -1126,11 +1126,11 @@ typedef struct NearmissBodyPair {
 } NearmissBodyPair;
 
 /*
- Bounds on the distance of two bodies. Infinite if it is not known.
+ Bounds on the distance of two bodies. If it is not known, the bounds are infinite and the places NaN.
  */
 typedef struct NearmissBodyDistance {
     /*
-     The bodies, the smaller id first; `UINT64_MAX` if there are none.
+     The bodies, in the order of the question, or the smaller id first; `UINT64_MAX` if there are none.
      */
     struct NearmissBodyPair pair;
     /*
@@ -1763,8 +1763,8 @@ NearmissStatus nearmiss_world_near_pairs(const struct NearmissWorld *world,
 
 /*
  Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
- `nearmiss_touch` does, and two shapes exactly. `limits` and `hint` count for two scans only. An answer about a
- shape has no normals. Thread safety: one call at a time for each scratch and each hint.
+ `nearmiss_touch` does, and two shapes exactly. `limits` and `hint` count for two scans only. An answer
+ about a shape has no normals. Thread safety: one call at a time for each scratch and each hint.
  */
 NearmissStatus nearmiss_world_collide(const struct NearmissWorld *world,
                                       const struct NearmissPlan *plan,
@@ -1786,10 +1786,10 @@ NearmissStatus nearmiss_world_distance(const struct NearmissWorld *world,
                                        struct NearmissBodyDistance *out);
 
 /*
- Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`, which
- may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot. `lower` is a
- bound for all pairs that count. If none does, both ids are `UINT64_MAX`. Thread safety: one call at a time for
- each scratch.
+ Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`,
+ which may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot.
+ `lower` is a bound for all pairs that count. If none does, both ids are `UINT64_MAX`. Thread safety: one
+ call at a time for each scratch.
 
  # Safety
  `ignored` are `ignored_count` pairs; other pointers are null or valid.

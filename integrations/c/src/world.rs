@@ -180,8 +180,8 @@ pub unsafe extern "C" fn nearmiss_world_near_pairs(
 }
 
 /// Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
-/// `nearmiss_touch` does, and two shapes exactly. `limits` and `hint` count for two scans only. An answer about a
-/// shape has no normals. Thread safety: one call at a time for each scratch and each hint.
+/// `nearmiss_touch` does, and two shapes exactly. `limits` and `hint` count for two scans only. An answer
+/// about a shape has no normals. Thread safety: one call at a time for each scratch and each hint.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_collide(
     world: Option<&World>,
@@ -234,10 +234,10 @@ pub extern "C" fn nearmiss_world_distance(
     })
 }
 
-/// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`, which
-/// may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot. `lower` is a
-/// bound for all pairs that count. If none does, both ids are `UINT64_MAX`. Thread safety: one call at a time for
-/// each scratch.
+/// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`,
+/// which may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot.
+/// `lower` is a bound for all pairs that count. If none does, both ids are `UINT64_MAX`. Thread safety: one
+/// call at a time for each scratch.
 ///
 /// # Safety
 /// `ignored` are `ignored_count` pairs; other pointers are null or valid.

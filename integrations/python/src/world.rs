@@ -39,7 +39,7 @@ impl AsShape for Shape {
 /// The plans of questions about touches.
 struct Plans {
     collide: CollidePlan,
-    /// Those about a scan and something else, if there is a scan.
+    /// The plans about a scan and something else, if there is a scan.
     of_scan: Option<(MeshScanPlan, ShapePlan)>,
 }
 
@@ -197,8 +197,8 @@ impl World {
     /// Answer `collide` for all pairs that may touch, or those with a body in the list `of`, on all cores.
     ///
     /// Returns the pairs of ids, of shape (N, 2), and a structured array of answers, of shape (N,), as
-    /// `Scan.collide_each` does. Options are those of `Scan.collide`. Shapes are solid, and have no normals and
-    /// no sources.
+    /// `Scan.collide_each` does. Options are those of `Scan.collide`. Shapes are solid, and have no normals
+    /// and no sources.
     #[pyo3(signature = (of = None, **options))]
     fn collide<'py>(
         &self,
@@ -220,9 +220,9 @@ impl World {
         Ok((rows(py, flat, &[pairs.len(), 2])?, array(py, answers)?))
     }
 
-    /// Bound the distance of two bodies: lower ≤ distance ≤ upper. Returns a `Distance`, without sources and a
-    /// band for shapes. Options are those of `Scan.distance`; `work` and `seconds` do not limit pairs with a
-    /// shape. Raises `KeyError` for an unknown id.
+    /// Bound the distance of two bodies: lower ≤ distance ≤ upper. Returns a `Distance`, without sources
+    /// and a band for shapes. Options are those of `Scan.distance`; `work` and `seconds` do not limit pairs
+    /// with a shape. Raises `KeyError` for an unknown id.
     #[pyo3(signature = (a, b, **options))]
     fn distance(
         &self,
@@ -244,8 +244,8 @@ impl World {
     /// Find the two bodies that are nearest to each other, of those whose bounding boxes come within the
     /// length `reach`. Pairs of ids in `ignore` do not count, such as neighbouring links of a robot.
     ///
-    /// Returns the ids and a `Distance` without sources and a band, or None if no pair counts. The lower bound
-    /// holds for all pairs. Options are `thickened`, `surface_only` and `relative`.
+    /// Returns the ids and a `Distance` without sources and a band, or None if no pair counts. The lower
+    /// bound holds for all pairs. Options are `thickened`, `surface_only` and `relative`.
     #[pyo3(signature = (reach = f64::INFINITY, *, ignore = Vec::new(), of = None, **options))]
     fn nearest(
         &self,

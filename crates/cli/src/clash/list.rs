@@ -48,8 +48,7 @@ pub(crate) struct ClashReport {
     pub(crate) contacts: usize,
     /// The number of near contacts around a hard clash.
     pub(crate) surroundings: usize,
-    /// How far b must move out of a hard clash, at least and at most, and in which direction. Null unless asked
-    /// for.
+    /// The length of the move of b out of a hard clash. Null unless asked for.
     pub(crate) depth: Option<f64>,
     pub(crate) depth_lower: Option<f64>,
     pub(crate) depth_direction: Option<[f64; 3]>,

@@ -30,13 +30,13 @@ impl PointHierarchy {
         flow.is_continue().then_some(search.found)
     }
 
-    /// Prepares some stored points as a scan of their own, with the options and the frame of this one, and its
-    /// reach. [`Self::source`] of the part holds the ids of this scan. `points` are in ascending order; in another
-    /// order, equally near points may be told apart otherwise. `None` for fewer than 8 points.
+    /// Prepares some stored points as a scan of their own, with the options and the frame of this one, and
+    /// its reach. [`Self::source`] of the part holds the ids of this scan. `points` are in ascending order;
+    /// in another order, equally near points may be told apart otherwise. `None` for fewer than 8 points.
     ///
     /// Costs as much as a [build](Self::build). Radii, normals and kinds are computed anew: near the border
-    /// of the part they may differ. The [metric](Self::metric) is Euclidean, as a graph of the whole scan does
-    /// not fit a part.
+    /// of the part they may differ. The [metric](Self::metric) is Euclidean, as a graph of the whole scan
+    /// does not fit a part.
     ///
     /// # Panics
     /// If there is no such point.

@@ -33,26 +33,27 @@ const NEARLY: f64 = 0.98;
 const TOLD: usize = 64;
 
 impl Pair<'_> {
-    /// Bounds, for each of some groups of contacts, how far b must at least be shifted so that the surfaces that
-    /// meet at these contacts are separate there.
+    /// Bounds, for each of some groups of contacts, how far b must at least be shifted so that the surfaces
+    /// that meet at these contacts are separate there.
     ///
-    /// Let B be the bounding box of the contacts of a group, grown by a length m to every side. The *part* of a
-    /// scan is what of it is in B and linked to these contacts, by steps of at most four sampling radii from
-    /// point to point. Of a [solid](Interior::Solid) scan it is everything in B, as all of its surface bounds
-    /// its inside. The depth is the penetration of both parts for the smallest tried m that is at least twice
-    /// its upper bound: then nothing from outside B comes within m/2 of the contacts. After the shift the parts
-    /// are separate, and the part of one scan is not inside the other scan if that is solid. They may meet other
-    /// pieces of a hollow scan.
+    /// Let B be the bounding box of the contacts of a group, grown by a length m to every side. The *part*
+    /// of a scan is what of it is in B and linked to these contacts, by steps of at most four sampling
+    /// radii from point to point. Of a [solid](Interior::Solid) scan it is everything in B, as all of its
+    /// surface bounds its inside. The depth is the penetration of both parts for the smallest tried m that
+    /// is at least twice its upper bound: then nothing from outside B comes within m/2 of the contacts.
+    /// After the shift the parts are separate, and the part of one scan is not inside the other scan if
+    /// that is solid. They may meet other pieces of a hollow scan.
     ///
-    /// The upper bound is never greater than that of the [penetration](Self::penetration) of the whole scans,
-    /// which separates all groups at once. That is also the upper bound for a clash through which a scan passes,
-    /// for scans of the geodesic metric, whose parts are not known, and if the budget ends the search too early.
+    /// The upper bound is never greater than that of the [penetration](Self::penetration) of the whole
+    /// scans, which separates all groups at once. That is also the upper bound for a clash through which a
+    /// scan passes, for scans of the geodesic metric, whose parts are not known, and if the budget ends the
+    /// search too early.
     ///
-    /// Parts are prepared as scans of their own, so a depth costs about a microsecond for each point around the
-    /// clash, and some hundred collision queries. A scan with more than 200,000 points in a ball about B is used
-    /// as a whole. Groups are shared among all threads; each query may spend the whole budget. Passes the share
-    /// of the groups that are done to `told`, again and again. Indices of groups that are out of range are
-    /// ignored. Allocates. Deterministic unless the budget has a deadline.
+    /// Parts are prepared as scans of their own, so a depth costs about a microsecond for each point around
+    /// the clash, and some hundred collision queries. A scan with more than 200,000 points in a ball about
+    /// B is used as a whole. Groups are shared among all threads; each query may spend the whole budget.
+    /// Passes the share of the groups that are done to `told`, again and again. Indices of groups that are
+    /// out of range are ignored. Allocates. Deterministic unless the budget has a deadline.
     #[must_use]
     pub fn depths(
         &self,
@@ -78,7 +79,7 @@ impl Pair<'_> {
     }
 }
 
-/// What the depths of all groups have in common.
+/// The data that the depths of all groups have in common.
 struct Depths<'d, 'a> {
     pair: &'d Pair<'a>,
     /// The stored points of all contacts.

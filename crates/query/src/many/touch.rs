@@ -1,4 +1,4 @@
-//! Whether two bodies of a world touch.
+//! The touch of two bodies of a world.
 
 use serde::{Deserialize, Serialize};
 

@@ -303,8 +303,8 @@ fn each_clash_has_the_depth_of_its_own_place() {
     }
 }
 
-/// The parts around a clash hold the points of its contacts, however far the places of these are; lower bounds
-/// are those of each clash; and what leaves one surface of a solid must leave the solid.
+/// The parts around a clash hold the points of its contacts, however far the places of these are; lower
+/// bounds are those of each clash; and what leaves one surface of a solid must leave the solid.
 #[test]
 fn depths_of_balls_about_points_and_of_a_hollow_block() {
     let floor = scene(&[(patch(3.0, 1.5), Pose::IDENTITY)], 0.03);
@@ -344,6 +344,7 @@ fn depths_of_balls_about_points_and_of_a_hollow_block() {
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "the test is about time")]
 fn depths_end_with_their_budget() {
     let floor = scene(&[(patch(6.0, 2.0), Pose::IDENTITY)], 0.03);
     let place =

@@ -249,8 +249,8 @@ fn invalid_shapes_and_poses_are_near_everything_and_have_no_distance() {
     assert_eq!(beside, ids[..2]);
 }
 
-/// Touches of all kinds of pairs agree with the distances of the same pairs, and with the questions about each
-/// kind.
+/// Touches of all kinds of pairs agree with the distances of the same pairs, and with the questions about
+/// each kind.
 #[test]
 fn touches_of_all_kinds_agree_with_their_distances() {
     let rng = &mut rng(6105);
