@@ -266,13 +266,14 @@ impl<'a> Views<'a> {
         }
     }
 
-    /// Returns how far b must move out of each group of contacts, for two scans; nothing for a mesh and a
-    /// scan.
+    /// Returns how far b must move out of each group of contacts of two scans, given the penetration of the
+    /// pair. Empty for a mesh and a scan.
     pub(crate) fn depths(
         &self,
         plan: &Plan,
         insides: &Insides,
         (contacts, groups): (&[Contact], &[ContactGroup]),
+        whole: &Penetration,
         budget: &Budget,
     ) -> Vec<Penetration> {
         let (Self::Scans([a, b]), Plan::Scans(plan), Insides::Scans(interiors)) = (self, plan, insides)
@@ -281,7 +282,7 @@ impl<'a> Views<'a> {
         };
         let groups: Vec<&ContactGroup> = groups.iter().collect();
         let pair = Pair::new(*a, *b).within(budget);
-        pair.depths((contacts, &groups), (plan, *interiors), &mut Scratch::default(), &mut |_| ())
+        pair.depths((contacts, &groups), (plan, *interiors), whole, &mut |_| ())
     }
 
     /// Returns the unit to which lengths are rounded: a hundredth of the smaller sampling radius.

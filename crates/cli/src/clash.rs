@@ -55,8 +55,8 @@ pub struct ClashArgs {
     pub depth: bool,
     /// Scans whose closed surface encloses a solid, for --depth
     ///
-    /// What is inside a solid overlaps it. Other scans are surfaces without inside, such as rooms: the way
-    /// out of these may lead to either side.
+    /// A body inside a solid overlaps it. A scan that is not solid is a surface, such as a room: the way out
+    /// may lead to either side of it.
     #[arg(long, value_enum, value_name = "WHICH", requires = "depth", conflicts_with = "thickened")]
     pub solid: Option<SolidName>,
     /// Write the list as a table for spreadsheets, one line for each clash

@@ -251,8 +251,13 @@ impl Pair<'_> {
             found.clashes.iter_mut().filter(|clash| clash.kind == ClashKind::Hard).collect();
         let groups: Vec<&ContactGroup> = hard.iter().map(|clash| &clash.group).collect();
         let mut told = |share| told(LISTED + (1.0 - LISTED) * share);
-        let asked = (found.contacts.as_slice(), groups.as_slice());
-        let depths = self.depths(asked, (&plan.touching, interiors), scratch, &mut told);
+        let asked = (&found.contacts[..found.hard], groups.as_slice());
+        let whole = if hard.is_empty() {
+            Penetration::UNKNOWN
+        } else {
+            self.penetration(&plan.touching, interiors, scratch)
+        };
+        let depths = self.depths(asked, (&plan.touching, interiors), &whole, &mut told);
         for (clash, depth) in hard.into_iter().zip(depths) {
             clash.depth = Some(depth);
         }

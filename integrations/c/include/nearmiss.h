@@ -1130,7 +1130,8 @@ typedef struct NearmissBodyPair {
  */
 typedef struct NearmissBodyDistance {
     /*
-     The bodies, in the order of the question, or the smaller id first; `UINT64_MAX` if there are none.
+     The ids of the bodies: in the order of the caller, or for a nearest pair the smaller one first. Both are
+     `UINT64_MAX` if no pair counts.
      */
     struct NearmissBodyPair pair;
     /*

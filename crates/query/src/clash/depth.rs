@@ -44,8 +44,9 @@ impl Pair<'_> {
     /// After the shift the parts are separate, and the part of one scan is not inside the other scan if
     /// that is solid. They may meet other pieces of a hollow scan.
     ///
-    /// The upper bound is never greater than that of the [penetration](Self::penetration) of the whole
-    /// scans, which separates all groups at once. That is also the upper bound for a clash through which a
+    /// `contacts` are all contacts of the pair, and `whole` is the [penetration](Self::penetration) of the
+    /// pair with the same plan and insides. The upper bound is never greater than that of `whole`, whose
+    /// shift separates all groups at once. It is also the upper bound for a clash through which a
     /// scan passes, for scans of the geodesic metric, whose parts are not known, and if the budget ends the
     /// search too early.
     ///
@@ -59,16 +60,11 @@ impl Pair<'_> {
         &self,
         (contacts, groups): (&[Contact], &[&ContactGroup]),
         (plan, interiors): (&CollidePlan, [Interior; 2]),
-        scratch: &mut Scratch,
+        whole: &Penetration,
         told: &mut dyn FnMut(f64),
     ) -> Vec<Penetration> {
-        if groups.is_empty() {
-            return Vec::new();
-        }
-        let whole = self.penetration(plan, interiors, scratch);
         let stored = stored(self.scans().each_ref(), contacts);
-        let lower = if groups.len() == 1 { whole.lower } else { 0.0 };
-        let depths = Depths { pair: self, stored, plan, interiors, whole, lower };
+        let depths = Depths { pair: self, stored, plan, interiors, whole: *whole };
         let mut found = Vec::with_capacity(groups.len());
         for some in groups.chunks(TOLD) {
             found.extend(map_with(some.len(), Scratch::default, |scratch, i| depths.of(some[i], scratch)));
@@ -88,8 +84,6 @@ struct Depths<'d, 'a> {
     interiors: [Interior; 2],
     /// The penetration of the whole scans.
     whole: Penetration,
-    /// A lower bound of each depth.
-    lower: f64,
 }
 
 impl Depths<'_, '_> {
@@ -97,8 +91,10 @@ impl Depths<'_, '_> {
         let scans = self.pair.scans().each_ref();
         let most = ROOM * self.whole.upper;
         let mut room = (FIRST * group.diagonal()).max(0.5 * default_link(scans)).max(self.plan.reach());
-        // What the whole scans tell about the clash: its lower bound is that of all clashes.
-        let mut answer = Penetration { lower: self.lower, ..self.whole };
+        // The shift of the whole scans frees this clash too. Their lower bound holds for all clashes together.
+        let is_only_one = group.contacts.len() == self.stored.len();
+        let lower = if is_only_one { self.whole.lower } else { 0.0 };
+        let mut answer = Penetration { lower, ..self.whole };
         if !most.is_finite() || self.plan.options().metric == Some(Metric::Geodesic) {
             return answer;
         }

@@ -320,7 +320,7 @@ fn depths_of_balls_about_points_and_of_a_hollow_block() {
         assert!(found.direction[2] > 0.9, "{exact}: {found:?}");
     }
 
-    // A lower bound of all clashes is none of one, also if the budget ends the search for that.
+    // A lower bound for all clashes together does not hold for one, also if a budget ends the search.
     for work in [100, 300, 1000, 2000, 3000, 5000, 10_000, 20_000] {
         let plan = ClashPlan::new(&options.with_depths([Interior::Hollow; 2]), &floor, &balls).unwrap();
         let pair = Pair::new(a, b).within(&Budget::UNLIMITED.with_work(work));
@@ -364,17 +364,20 @@ fn depths_end_with_their_budget() {
     let hasty = pair.within(&Budget::UNLIMITED.with_deadline(deadline));
     let mut shares = Vec::new();
     let start = std::time::Instant::now();
-    let found = hasty.depths(asked, (&plan, [Interior::Hollow; 2]), scratch, &mut |share| shares.push(share));
+    let hollow = [Interior::Hollow; 2];
+    let whole = hasty.penetration(&plan, hollow, scratch);
+    let found = hasty.depths(asked, (&plan, hollow), &whole, &mut |share| shares.push(share));
     let in_haste = start.elapsed();
     assert!(shares.last() == Some(&1.0) && shares.is_sorted(), "{shares:?}");
     // No part is prepared: all answers are those of the whole scans.
     assert!(found.iter().all(|depth| depth == &found[0] && !depth.complete), "{found:?}");
-    let found = pair.depths(asked, (&plan, [Interior::Hollow; 2]), scratch, &mut |_| ());
+    let whole = pair.penetration(&plan, hollow, scratch);
+    let found = pair.depths(asked, (&plan, hollow), &whole, &mut |_| ());
     assert!(found.iter().all(|depth| depth.complete && depth.upper < 0.2), "{found:?}");
     assert!(in_haste < 2 * (start.elapsed() - in_haste), "{in_haste:?}");
     // Groups may be the caller's own.
     let strange = ContactGroup { contacts: vec![usize::MAX], ..groups[0].clone() };
-    let odd = pair.depths((asked.0, &[&strange]), (&plan, [Interior::Hollow; 2]), scratch, &mut |_| ());
+    let odd = pair.depths((asked.0, &[&strange]), (&plan, hollow), &whole, &mut |_| ());
     assert!(odd[0].upper.is_finite(), "{odd:?}");
 }
 
