@@ -1130,8 +1130,8 @@ typedef struct NearmissBodyPair {
  */
 typedef struct NearmissBodyDistance {
     /*
-     The ids of the bodies: in the order of the caller, or for a nearest pair the smaller one first. Both are
-     `UINT64_MAX` if no pair counts.
+     The ids of the bodies: in the order of the caller, or for a nearest pair the smaller one first. Both
+     are `UINT64_MAX` if no pair counts.
      */
     struct NearmissBodyPair pair;
     /*

@@ -42,8 +42,8 @@ pub struct BodyPair {
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct BodyDistance {
-    /// The ids of the bodies: in the order of the caller, or for a nearest pair the smaller one first. Both are
-    /// `UINT64_MAX` if no pair counts.
+    /// The ids of the bodies: in the order of the caller, or for a nearest pair the smaller one first. Both
+    /// are `UINT64_MAX` if no pair counts.
     pub pair: BodyPair,
     /// A proven lower bound.
     pub lower: f64,

@@ -91,7 +91,8 @@ impl Depths<'_, '_> {
         let scans = self.pair.scans().each_ref();
         let most = ROOM * self.whole.upper;
         let mut room = (FIRST * group.diagonal()).max(0.5 * default_link(scans)).max(self.plan.reach());
-        // The shift of the whole scans frees this clash too. Their lower bound holds for all clashes together.
+        // The shift of the whole scans frees this clash too. Their lower bound holds for all clashes
+        // together.
         let is_only_one = group.contacts.len() == self.stored.len();
         let lower = if is_only_one { self.whole.lower } else { 0.0 };
         let mut answer = Penetration { lower, ..self.whole };
