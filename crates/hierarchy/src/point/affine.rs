@@ -10,7 +10,7 @@ use nearmiss_lanes::wide::{WIDTH, along, load, spread_out, squared};
 /// not extend, such as the normal of a flat patch, towards the identity.
 const RIDGE: f64 = 1e-5;
 
-/// Stretches that differ from 1 by less count as none, so that rigid motions keep all radii.
+/// Changes of the spacing by less, as a share, count as none, so that rigid motions keep all radii.
 const RIGID: f32 = 1e-3;
 
 /// A leaf at rest: what the fit needs of its points.
@@ -29,10 +29,11 @@ pub(crate) struct Rest {
 pub(crate) struct Motion {
     /// For each column of the linear map, the cross product of the two others.
     cofactors: [[f32; 3]; 3],
-    /// The greatest stretch of a length in the tangent plane.
-    pub(crate) stretch: f32,
-    /// `false` if lengths in the tangent plane have changed too much, or no affine map moves the
-    /// points.
+    /// The factor by which the spacing of points in the tangent plane changes: the root of that of
+    /// areas.
+    pub(crate) spacing: f32,
+    /// `false` if spacing or lengths in the tangent plane have changed too much, or no affine map moves
+    /// the points.
     pub(crate) is_carried: bool,
 }
 
@@ -79,8 +80,9 @@ impl Rest {
         Self { middle, inverse, ridge, normal }
     }
 
-    /// Fits the motion from `points`, at rest, to the places `now`. A carried leaf stretches by at
-    /// most `most` or its reciprocal, and each point is within `off` of its radius of its place.
+    /// Fits the motion from `points`, at rest, to the places `now`. For a leaf that is carried along, the
+    /// spacing changes by at most the factor `most` or its reciprocal, and so does the ratio of a length
+    /// to the spacing. Each point is within `off` of its radius of its place.
     #[inline(always)]
     pub(crate) fn motion(
         &self,
@@ -116,7 +118,8 @@ impl Rest {
         let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
         let apart = (half * half + uv * uv).sqrt();
         let [low, high] = [(mean - apart).max(0.0).sqrt(), (mean + apart).sqrt()];
-        let mut is_carried = low * most >= 1.0 && high <= most;
+        let spacing = (low * high).sqrt();
+        let mut is_carried = spacing * most >= 1.0 && spacing <= most && high <= most * spacing;
         for ((p, q), radius) in points.iter().zip(now).zip(radii) {
             let d = sub(sub(*q, middle), apply(sub(*p, self.middle)));
             // Also false for NaN.
@@ -126,7 +129,7 @@ impl Rest {
         let [x, y, z] = [column(0), column(1), column(2)];
         Motion {
             cofactors: [cross(y, z), cross(z, x), cross(x, y)],
-            stretch: if (high - 1.0).abs() < RIGID { 1.0 } else { high },
+            spacing: if (spacing - 1.0).abs() < RIGID { 1.0 } else { spacing },
             is_carried,
         }
     }
@@ -192,11 +195,11 @@ mod tests {
     #[test]
     fn a_rigid_motion_keeps_lengths_and_turns_normals() {
         let still = motion_by(|p| p);
-        assert!(still.is_carried && still.stretch == 1.0, "{still:?}");
+        assert!(still.is_carried && still.spacing == 1.0, "{still:?}");
         assert!(is_near(turned(&still, [0.6, 0.0, 0.8]), [0.6, 0.0, 0.8]), "{still:?}");
         // A quarter turn about the y axis.
         let quarter = motion_by(|[x, y, z]| [z + 7.0, y, -x]);
-        assert!(quarter.is_carried && quarter.stretch == 1.0, "{quarter:?}");
+        assert!(quarter.is_carried && quarter.spacing == 1.0, "{quarter:?}");
         assert!(is_near(turned(&quarter, [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]), "{quarter:?}");
         assert!(is_near(turned(&quarter, [0.2, 0.0, 0.98]), [0.98, 0.0, -0.2]), "{quarter:?}");
     }
@@ -209,14 +212,19 @@ mod tests {
             is_near(turned(&sheared, [0.0, 0.0, 1.0]), [-0.2 / length, 0.0, 1.0 / length]),
             "{sheared:?}"
         );
-        assert!((sheared.stretch - length).abs() < 1e-3 && sheared.is_carried, "{sheared:?}");
+        assert!((sheared.spacing - length.sqrt()).abs() < 1e-3 && sheared.is_carried, "{sheared:?}");
     }
 
     #[test]
     fn stretches_collapses_and_tears_are_not_carried() {
-        assert!(motion_by(|[x, y, z]| [1.2 * x, y, z]).is_carried, "within the factor");
-        assert!(!motion_by(|[x, y, z]| [1.3 * x, y, z]).is_carried, "stretched");
-        assert!(!motion_by(|[x, y, z]| [x, 0.7 * y, z]).is_carried, "compressed");
+        let wider = motion_by(|[x, y, z]| [1.5 * x, y, z]);
+        assert!(wider.is_carried && (wider.spacing - 1.5_f32.sqrt()).abs() < 1e-3, "{wider:?}");
+        assert!(motion_by(|[x, y, z]| [1.2 * x, 1.2 * y, z]).is_carried, "within the factor");
+        assert!(!motion_by(|[x, y, z]| [1.3 * x, 1.3 * y, z]).is_carried, "stretched");
+        assert!(!motion_by(|[x, y, z]| [1.6 * x, y, z]).is_carried, "stretched along one axis");
+        assert!(!motion_by(|[x, y, z]| [x, 0.6 * y, z]).is_carried, "compressed");
+        assert!(motion_by(|[x, y, z]| [1.2 * x, y / 1.2, z]).is_carried, "areas are kept");
+        assert!(!motion_by(|[x, y, z]| [1.3 * x, y / 1.3, z]).is_carried, "lengths change too much");
         assert!(!motion_by(|_| [1.0, 2.0, 3.0]).is_carried, "in one point");
         assert!(!motion_by(|[x, y, z]| [x, y, if x > 101.0 { z + 1.5 } else { z }]).is_carried, "torn");
         assert!(!motion_by(|[x, ..]| [x, f32::NAN, 0.0]).is_carried, "NaN");

@@ -20,8 +20,8 @@ use crate::scan::build::PointHierarchy;
 use crate::scan::closing::Closing;
 use crate::tree::topology::Topology;
 
-/// The greatest change of lengths in the tangent planes of a leaf, as a factor or its reciprocal, for
-/// which its discs are carried along.
+/// The greatest change of the spacing of a leaf, and of lengths in its tangent plane relative to the
+/// spacing, as a factor or its reciprocal, for which its discs are carried along.
 const STRETCH: f32 = 1.25;
 
 /// The greatest distance of a point from where the affine map of its leaf takes it, in its local
@@ -233,9 +233,10 @@ impl AtRest<'_> {
                 (STRETCH, OFF),
             );
             motion.turn(simd, &self.normals[before], &mut normals.elements[own.clone()]);
-            let stretch = if motion.is_carried { motion.stretch } else { 1.0 };
+            // Where points are fitted anew, this is what their neighbours are compared with.
+            let spacing = if motion.spacing.is_finite() { motion.spacing } else { 1.0 };
             for (now, before) in radii.elements[own].iter_mut().zip(radii_before) {
-                *now = (before * stretch).min(self.reach);
+                *now = (before * spacing).min(self.reach);
             }
         }
     }
