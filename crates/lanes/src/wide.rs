@@ -207,6 +207,13 @@ pub fn greatest_of_each<S: Simd>(rows: [f32x16<S>; WIDTH]) -> [f32; WIDTH] {
     reduced(rows, |a, b| a.max(b))
 }
 
+/// Returns the sum of each of sixteen rows.
+#[inline(always)]
+#[must_use]
+pub fn sum_of_each<S: Simd>(rows: [f32x16<S>; WIDTH]) -> [f32; WIDTH] {
+    reduced(rows, |a, b| a + b)
+}
+
 /// Combines the lanes of each of sixteen rows.
 #[inline(always)]
 fn reduced<S: Simd>(r: [f32x16<S>; WIDTH], f: impl Fn(f32x16<S>, f32x16<S>) -> f32x16<S>) -> [f32; WIDTH] {

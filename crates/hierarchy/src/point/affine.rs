@@ -4,7 +4,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::vector::{cross, dot, sub, tangents};
-use nearmiss_lanes::wide::{WIDTH, along, load, spread_out, squared};
+use nearmiss_lanes::wide::{WIDTH, along, load, seen_from, spread_out, squared, sum, sum_of_each};
+
+use crate::tree::topology::MOST_LEAF_POINTS;
 
 /// The ridge of the fit as a share of the second moments. It draws directions in which the points do
 /// not extend, such as the normal of a flat patch, towards the identity.
@@ -37,7 +39,17 @@ pub(crate) struct Motion {
     pub(crate) is_carried: bool,
 }
 
+/// Points or normals side by side.
+pub(crate) type Lanes = [[f32; WIDTH]; 3];
+
+/// Puts up to sixteen vectors side by side. Surplus lanes have the vector `rest`.
 #[inline(always)]
+pub(crate) fn side_by_side(vectors: &[[f32; 3]], rest: [f32; 3]) -> Lanes {
+    let mut lanes = [[rest[0]; WIDTH], [rest[1]; WIDTH], [rest[2]; WIDTH]];
+    spread_out(vectors, &mut lanes);
+    lanes
+}
+
 fn middle(points: &[[f32; 3]]) -> [f32; 3] {
     // Relative to the first point, where rounding is least.
     let (first, mut sum) = (points[0], [0.0_f32; 3]);
@@ -80,28 +92,58 @@ impl Rest {
         Self { middle, inverse, ridge, normal }
     }
 
-    /// Fits the motion from `points`, at rest, to the places `now`. For a leaf that is carried along, the
-    /// spacing changes by at most the factor `most` or its reciprocal, and so does the ratio of a length
-    /// to the spacing. Each point is within `off` of its radius of its place.
+    /// Returns the points at rest relative to their middle, side by side. Surplus lanes are zero.
+    pub(crate) fn relative(&self, points: &[[f32; 3]]) -> impl Iterator<Item = Lanes> {
+        points.chunks(WIDTH).map(|points| {
+            let mut lanes = side_by_side(points, self.middle);
+            for k in 0..3 {
+                lanes[k].iter_mut().for_each(|c| *c -= self.middle[k]);
+            }
+            lanes
+        })
+    }
+
+    /// Fits the motion from `points`, at rest and [relative](Self::relative), to the places `now`. For a
+    /// leaf that is carried along, the spacing changes by at most the factor `most` or its reciprocal, and
+    /// so does the ratio of a length to the spacing. Each point is within `off` of its radius of its place.
     #[inline(always)]
-    pub(crate) fn motion(
+    pub(crate) fn motion<S: Simd>(
         &self,
-        points: &[[f32; 3]],
+        simd: S,
+        points: &[Lanes],
         now: &[[f32; 3]],
         radii: &[f32],
         (most, off): (f32, f32),
     ) -> Motion {
-        let middle = middle(now);
+        let (first, mut places) = (now[0], [[[0.0; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH]);
+        let mut sums = [f32x16::splat(simd, 0.0); 3];
+        for (now, places) in now.chunks(WIDTH).zip(&mut places) {
+            *places = side_by_side(now, first);
+            // Relative to the first point, where rounding is least.
+            let q = seen_from(simd, places, first);
+            for k in 0..3 {
+                sums[k] += q[k];
+            }
+        }
+        #[expect(clippy::cast_precision_loss, reason = "at most 64")]
+        let count = now.len() as f32;
+        let middle = [
+            first[0] + sum(sums[0]) / count,
+            first[1] + sum(sums[1]) / count,
+            first[2] + sum(sums[2]) / count,
+        ];
         // Rows of Σ (q − q̄)(p − p̄)ᵀ.
-        let mut rows = [[self.ridge, 0.0, 0.0], [0.0, self.ridge, 0.0], [0.0, 0.0, self.ridge]];
-        for (p, q) in points.iter().zip(now) {
-            let (p, q) = (sub(*p, self.middle), sub(*q, middle));
+        let mut products = [f32x16::splat(simd, 0.0); WIDTH];
+        for (points, places) in points.iter().zip(&places) {
+            let (p, q) = (load(simd, points), seen_from(simd, places, middle));
             for i in 0..3 {
                 for k in 0..3 {
-                    rows[i][k] += q[i] * p[k];
+                    products[3 * i + k] += q[i] * p[k];
                 }
             }
         }
+        let [xx, xy, xz, yx, yy, yz, zx, zy, zz, ..] = sum_of_each(products);
+        let rows = [[xx + self.ridge, xy, xz], [yx, yy + self.ridge, yz], [zx, zy, zz + self.ridge]];
         let [a, b, c, d, e, f] = self.inverse;
         let mut linear = rows;
         for i in 0..3 {
@@ -120,10 +162,17 @@ impl Rest {
         let [low, high] = [(mean - apart).max(0.0).sqrt(), (mean + apart).sqrt()];
         let spacing = (low * high).sqrt();
         let mut is_carried = spacing * most >= 1.0 && spacing <= most && high <= most * spacing;
-        for ((p, q), radius) in points.iter().zip(now).zip(radii) {
-            let d = sub(sub(*q, middle), apply(sub(*p, self.middle)));
+        for ((points, places), radii) in points.iter().zip(&places).zip(radii.chunks(WIDTH)) {
+            let mut within = [f32::INFINITY; WIDTH];
+            within[..radii.len()].copy_from_slice(radii);
+            let within = f32x16::load_array_ref(simd, &within) * off;
+            let (p, mut d) = (load(simd, points), seen_from(simd, places, middle));
+            for k in 0..3 {
+                d[k] -= along(p, linear[k]);
+            }
             // Also false for NaN.
-            is_carried &= dot(d, d) <= (off * radius) * (off * radius);
+            let is_near: mask32x16<S> = squared(d).simd_le(within * within);
+            is_carried &= is_near.all_true();
         }
         let column = |k: usize| [linear[0][k], linear[1][k], linear[2][k]];
         let [x, y, z] = [column(0), column(1), column(2)];
@@ -139,12 +188,11 @@ impl Motion {
     /// Sets `normals` to where the unit normals `before` point after the motion. If the motion
     /// flattens the plane of one, that stays.
     #[inline(always)]
-    pub(crate) fn turn<S: Simd>(&self, simd: S, before: &[[f32; 3]], normals: &mut [[f32; 3]]) {
+    pub(crate) fn turn<S: Simd>(&self, simd: S, before: &[Lanes], normals: &mut [[f32; 3]]) {
         let [x, y, z] = &self.cofactors;
-        for (before, normals) in before.chunks(WIDTH).zip(normals.chunks_mut(WIDTH)) {
-            let mut rows = [[0.0; WIDTH]; 3];
-            spread_out(before, &mut rows);
-            let n = load(simd, &rows);
+        let mut rows = [[0.0; WIDTH]; 3];
+        for (before, normals) in before.iter().zip(normals.chunks_mut(WIDTH)) {
+            let n = load(simd, before);
             let mut turned = n;
             for k in 0..3 {
                 turned[k] = along(n, [x[k], y[k], z[k]]);
@@ -172,6 +220,7 @@ mod tests {
     fn turned(motion: &Motion, normal: [f32; 3]) -> [f32; 3] {
         let before: Vec<[f32; 3]> = (0..20).map(|i| if i == 17 { normal } else { [0.0, 1.0, 0.0] }).collect();
         let mut normals = vec![[f32::NAN; 3]; 20];
+        let before: Vec<Lanes> = before.chunks(WIDTH).map(|before| side_by_side(before, [0.0; 3])).collect();
         dispatch!(Level::new(), simd => motion.turn(simd, &before, &mut normals));
         normals[17]
     }
@@ -185,7 +234,8 @@ mod tests {
         let points = patch();
         let rest = Rest::new(&points, &[[0.0, 0.0, 1.0]; 16]);
         let now: Vec<[f32; 3]> = points.iter().map(|p| f(*p)).collect();
-        rest.motion(&points, &now, &[1.4; 16], (1.25, 0.2))
+        let points: Vec<Lanes> = rest.relative(&points).collect();
+        dispatch!(Level::new(), simd => rest.motion(simd, &points, &now, &[1.4; 16], (1.25, 0.2)))
     }
 
     fn is_near(a: [f32; 3], b: [f32; 3]) -> bool {

@@ -17,7 +17,7 @@ use crate::point::leaf_block::LeafParts;
 use crate::point::neighbours::groups_in_motion;
 use crate::scan::build::PointHierarchy;
 use crate::scan::identity::identity;
-use crate::scan::sampling::quantile;
+use crate::scan::sampling::Selection;
 use crate::tree::axes::{Spread, principal_axes};
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Root, growths_of_siblings, reaches, siblings};
@@ -31,36 +31,43 @@ pub(crate) struct Closing {
     growths: Vec<[Growth; 2]>,
     spreads: Vec<Spread>,
     solved: Vec<EigenBlock>,
-    counts: Vec<u32>,
+    selection: Selection,
 }
 
 impl Closing {
-    /// Sets the sampling radius, the support radii of the points, and the balls around blocks. There
-    /// are no neighbour lists afterwards.
+    /// Sets the sampling radius, the support radii of the points, the balls around blocks, and the axes
+    /// of boxes. There are no neighbour lists afterwards.
     pub(crate) fn support(&mut self, scan: &mut PointHierarchy) {
-        scan.meta.sampling_radius = quantile(&scan.arrays.radii, &mut self.counts);
-        let (radius, unit) = (f64::from(scan.meta.sampling_radius), 1.0 / scan.meta.frame.scale);
-        // The options were valid for the first frame.
-        scan.plan = SurfacePlan::new(&scan.meta.surface, radius, unit).unwrap_or(scan.plan);
-        let (plan, radii): (_, &[f32]) = (&scan.plan, &scan.arrays.radii);
-        let blocks = scan.arrays.blocks.to_mut();
-        change_each(blocks, WIDTH, |number, block| {
-            plan.tune(block, &radii[number * WIDTH..radii.len().min((number + 1) * WIDTH)]);
-        });
-        groups_in_motion(blocks, scan.arrays.groups.to_mut());
-        if !scan.arrays.listed.is_empty() {
-            scan.arrays.lists.to_mut().fill(NeighbourList { within: -1.0, first: 0, count: 0 });
-            scan.arrays.listed = Array::default();
+        // Unpacks the positions of a scan from a file.
+        let _unpacked = scan.positions();
+        let PointHierarchy { meta, plan, topology, arrays, positions } = scan;
+        let positions: &[[f32; 3]] = positions.get().map_or(&[], |positions| positions);
+        let Self { boxes, spreads, solved, selection, .. } = self;
+        boxes.resize(topology.len(), OrientedBox::default());
+        // Each has a part on one thread, which the other fills.
+        both(
+            || principal_axes(positions, topology, boxes, (spreads, solved)),
+            || {
+                meta.sampling_radius = selection.of(&arrays.radii);
+                let (radius, unit) = (f64::from(meta.sampling_radius), 1.0 / meta.frame.scale);
+                // The options were valid for the first frame.
+                *plan = SurfacePlan::new(&meta.surface, radius, unit).unwrap_or(*plan);
+                let (radii, blocks): (&[f32], _) = (&arrays.radii, arrays.blocks.to_mut());
+                change_each(blocks, WIDTH, |number, block| {
+                    plan.tune(block, &radii[number * WIDTH..radii.len().min((number + 1) * WIDTH)]);
+                });
+                groups_in_motion(blocks, arrays.groups.to_mut());
+            },
+        );
+        if !arrays.listed.is_empty() {
+            arrays.lists.to_mut().fill(NeighbourList { within: -1.0, first: 0, count: 0 });
+            arrays.listed = Array::default();
         }
     }
 
-    /// Bounds all nodes, and sets all that depends on boxes.
+    /// Bounds all nodes along their axes, and sets all that depends on boxes.
     pub(crate) fn bound(&mut self, scan: &mut PointHierarchy) {
-        let nodes = scan.topology.len();
-        self.boxes.resize(nodes, OrientedBox::default());
-        self.growths.resize(nodes, Default::default());
-        let memory = (&mut self.spreads, &mut self.solved);
-        principal_axes(scan.positions(), &scan.topology, &mut self.boxes, memory);
+        self.growths.resize(scan.topology.len(), Default::default());
         self.bound_leaves(scan);
         self.finish(scan);
     }

@@ -20,7 +20,7 @@ use crate::scan::deform_error::DeformError;
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::points::step;
 use crate::scan::refit::LEAST_RADIUS;
-use crate::scan::sampling::{check_reach, quantile, reach_of};
+use crate::scan::sampling::{Selection, check_reach, reach_of};
 use crate::tree::items::Item;
 use crate::tree::split::split_loose;
 use crate::tree::topology::Topology;
@@ -46,7 +46,7 @@ pub(crate) struct Pixels {
     along: Vec<Pixel>,
     radii: Vec<f32>,
     items: Vec<Item>,
-    counts: Vec<u32>,
+    selection: Selection,
 }
 
 /// Replaces `scan` by the measured points of a depth frame. Returns `false`, and changes nothing, if
@@ -74,10 +74,10 @@ pub(crate) fn replace_organised(
         return Ok(false);
     }
     pixels.along = pixels.raster.measured();
-    let Pixels { raster, fits, codes, along, radii, items, counts } = pixels;
+    let Pixels { raster, fits, codes, along, radii, items, selection } = pixels;
     radii.resize(count, 0.0);
     fill(radii, |i| raster.radius(along[i]));
-    let (unit, ordinary) = (1.0 / frame.scale, quantile(radii, counts));
+    let (unit, ordinary) = (1.0 / frame.scale, selection.of(radii));
     let reach = reach_of(options, ordinary, unit);
     let far =
         (0..3).map(|k| (bounds.min[k] - frame.origin[k]).abs().max((bounds.max[k] - frame.origin[k]).abs()));

@@ -4,14 +4,14 @@ use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::{Aabb, Frame};
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{Runs, change_together, chunks, fill, runs};
+use nearmiss_lanes::parallel::{Runs, change_together, runs};
 use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::blocks_of;
 
 use crate::patch::alignment::align;
 use crate::patch::classes::votes;
 use crate::patch::surfels::{Fit, fits_of, gaps_of};
-use crate::point::affine::{Motion, Rest};
+use crate::point::affine::{Lanes, Motion, Rest, side_by_side};
 use crate::point::disc::PointCode;
 use crate::point::gather::Index;
 use crate::point::neighbours::supports;
@@ -60,8 +60,10 @@ pub(crate) struct Memory {
     /// `true` if the scan is as it was when last fitted, and the state at rest below is not up to
     /// date.
     is_fresh: bool,
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
+    /// Positions relative to the middle of their leaf, and normals, side by side: as many lanes for each
+    /// leaf.
+    positions: Vec<Lanes>,
+    normals: Vec<Lanes>,
     radii: Vec<f32>,
     leaves: Vec<Rest>,
     motions: Vec<Motion>,
@@ -87,18 +89,20 @@ impl Memory {
             return;
         }
         let topology = scan.topology();
-        self.positions.clear();
-        self.positions.extend_from_slice(scan.positions());
-        self.normals.clear();
-        self.normals.extend_from_slice(scan.normals());
+        let each = lanes_a_leaf(topology);
+        self.positions.resize(topology.leaves() * each, Lanes::default());
+        self.normals.resize(topology.leaves() * each, Lanes::default());
         self.radii.clear();
         self.radii.extend_from_slice(scan.radii());
         self.leaves.resize(topology.leaves(), Rest::default());
         self.motions.resize(topology.leaves(), Motion::default());
         let Self { positions, normals, leaves, .. } = self;
-        fill(leaves, |leaf| {
-            let points = topology.points_of_leaf(leaf);
-            Rest::new(&positions[points.clone()], &normals[points])
+        let parts = (runs(leaves, 1), runs(positions, each), runs(normals, each));
+        change_together(0..topology.leaves(), WIDTH, parts, &|items, (leaves, positions, normals)| {
+            let lanes = positions.elements.chunks_mut(each).zip(normals.elements.chunks_mut(each));
+            for ((leaf, rest), lanes) in items.zip(leaves.elements).zip(lanes) {
+                *rest = rest_of(scan, leaf, lanes);
+            }
         });
     }
 
@@ -109,21 +113,34 @@ impl Memory {
 
     /// Takes the `changed` leaves as they are in `scan` for their state at rest.
     fn rest(&mut self, scan: &PointHierarchy, changed: &[u32]) {
+        let each = lanes_a_leaf(scan.topology());
         let Self { positions, normals, radii, leaves, .. } = self;
-        let rests = chunks(changed, |changed| {
-            let points = changed.iter().map(|leaf| scan.topology().points_of_leaf(*leaf as usize));
-            let rests =
-                points.map(|points| Rest::new(&scan.positions()[points.clone()], &scan.normals()[points]));
-            rests.collect::<Vec<_>>()
-        });
-        for (leaf, rest) in changed.iter().zip(rests.into_iter().flatten()) {
-            let points = scan.topology().points_of_leaf(*leaf as usize);
-            positions[points.clone()].copy_from_slice(&scan.positions()[points.clone()]);
-            normals[points.clone()].copy_from_slice(&scan.normals()[points.clone()]);
+        for &leaf in changed {
+            let leaf = leaf as usize;
+            let lanes = leaf * each..(leaf + 1) * each;
+            leaves[leaf] = rest_of(scan, leaf, (&mut positions[lanes.clone()], &mut normals[lanes]));
+            let points = scan.topology().points_of_leaf(leaf);
             radii[points.clone()].copy_from_slice(&scan.radii()[points]);
-            leaves[*leaf as usize] = rest;
         }
     }
+}
+
+/// Returns the number of lanes that hold the points of a leaf.
+const fn lanes_a_leaf(topology: &Topology) -> usize {
+    topology.leaf_size().div_ceil(WIDTH)
+}
+
+/// Returns a leaf of `scan` at rest, and sets its positions and normals.
+fn rest_of(scan: &PointHierarchy, leaf: usize, (positions, normals): (&mut [Lanes], &mut [Lanes])) -> Rest {
+    let points = scan.topology().points_of_leaf(leaf);
+    let (own, of_own) = (&scan.positions()[points.clone()], &scan.normals()[points]);
+    let rest = Rest::new(own, of_own);
+    positions.iter_mut().zip(rest.relative(own)).for_each(|(lanes, now)| *lanes = now);
+    normals
+        .iter_mut()
+        .zip(of_own.chunks(WIDTH))
+        .for_each(|(lanes, now)| *lanes = side_by_side(now, [0.0; 3]));
+    rest
 }
 
 /// Moves the points of `scan`.
@@ -197,8 +214,8 @@ type Moved<'a> =
 
 /// The state at rest that motions start from.
 struct AtRest<'a> {
-    positions: &'a [[f32; 3]],
-    normals: &'a [[f32; 3]],
+    positions: &'a [Lanes],
+    normals: &'a [Lanes],
     radii: &'a [f32],
     leaves: &'a [Rest],
     source: &'a [u32],
@@ -215,7 +232,7 @@ impl AtRest<'_> {
         (leaf_size, first): (usize, usize),
         (positions, blocks, motions, normals, radii): Moved<'_>,
     ) {
-        let start = first * leaf_size;
+        let (start, each) = (first * leaf_size, leaf_size.div_ceil(WIDTH));
         for (now, source) in positions.elements.iter_mut().zip(&self.source[start..]) {
             *now = frame.to_local(points[*source as usize]);
         }
@@ -224,15 +241,11 @@ impl AtRest<'_> {
         }
         for (leaf, motion) in motions.elements.iter_mut().enumerate() {
             let own = leaf * leaf_size..positions.elements.len().min((leaf + 1) * leaf_size);
-            let before = start + own.start..start + own.end;
-            let (radii_before, now) = (&self.radii[before.clone()], &positions.elements[own.clone()]);
-            *motion = self.leaves[first + leaf].motion(
-                &self.positions[before.clone()],
-                now,
-                radii_before,
-                (STRETCH, OFF),
-            );
-            motion.turn(simd, &self.normals[before], &mut normals.elements[own.clone()]);
+            let radii_before = &self.radii[start + own.start..start + own.end];
+            let lanes = (first + leaf) * each..(first + leaf + 1) * each;
+            let (rest, now) = (&self.positions[lanes.clone()], &positions.elements[own.clone()]);
+            *motion = self.leaves[first + leaf].motion(simd, rest, now, radii_before, (STRETCH, OFF));
+            motion.turn(simd, &self.normals[lanes], &mut normals.elements[own.clone()]);
             // Where points are fitted anew, this is what their neighbours are compared with.
             let spacing = if motion.spacing.is_finite() { motion.spacing } else { 1.0 };
             for (now, before) in radii.elements[own].iter_mut().zip(radii_before) {

@@ -1,7 +1,6 @@
 //! The sampling density: local radii, the sampling radius, and the points with their support radii.
 
 use nearmiss_index::{BlockBoxes, PointBlock};
-use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{both, change_each, fill, ranges};
 use nearmiss_store::{Room, Workspace};
 use nearmiss_surface::SurfacePlan;
@@ -52,11 +51,11 @@ impl Sampling {
         work.progress().reach(share::SPACINGS);
         let mut radii = smooth(&tree, &spacings, work)?;
         work.progress().reach(share::RADII);
-        let mut counts = Vec::new();
-        let reach = reach_of(options, quantile(&radii, &mut counts), unit);
+        let mut selection = Selection::default();
+        let reach = reach_of(options, selection.of(&radii), unit);
         check_reach(reach, extent(positions), unit)?;
         limit(&mut spacings, &mut radii, reach);
-        let sampling_radius = quantile(&radii, &mut counts);
+        let sampling_radius = selection.of(&radii);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
         set_reaches(topology, boxes, &radii);
         change_each(&mut blocks, 1 << 8, |number, block| plan.tune(block, &radii[places(number)]));
@@ -107,41 +106,71 @@ fn extent(positions: &[[f32; 3]]) -> f32 {
     greatest.into_iter().fold(0.0, f32::max)
 }
 
-/// Returns the [sampling radius](sampling_rank) of radii, none of which may be negative. Numbers
-/// that are not negative have the same order as their bits. So the highest digits of the bits are
-/// counted first, then lower ones. `counts` is reused memory.
-pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<u32>) -> f32 {
-    /// The number of bits of a digit. With fewer, most numbers have the same one, and its count waits for
-    /// itself.
-    const DIGIT: u32 = 16;
-    let mut rank = id32(sampling_rank(radii.len()));
-    let (left, right) = radii.split_at(radii.len() / 2);
-    // The bits found so far, and the number of lower ones.
-    let (mut found, mut below) = (0_u32, u32::BITS);
-    while below > 0 {
-        let digit = below.min(DIGIT);
-        counts.clear();
-        counts.resize(2 << digit, 0);
-        let (counts, more) = counts.split_at_mut(1 << digit);
-        let count = |radii: &[f32], counts: &mut [u32]| {
-            for bits in radii.iter().map(|radius| radius.to_bits()) {
-                // The first digit has nothing above it.
-                if u64::from(bits) >> below == u64::from(found) {
-                    counts[(bits >> (below - digit)) as usize % counts.len()] += 1;
-                }
-            }
-        };
-        both(|| count(left, counts), || count(right, more));
-        let here = counts.iter().zip(more).position(|(count, more)| {
-            let count = *count + *more;
-            let is_here = rank < count;
-            rank -= if is_here { 0 } else { count };
-            is_here
-        });
-        found = found << digit | id32(here.unwrap_or_default());
-        below -= digit;
+/// Selects the [sampling radius](sampling_rank), with memory that is reused.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Selection {
+    sample: Vec<f32>,
+    /// The radii of both halves between two bounds.
+    between: [Vec<f32>; 2],
+}
+
+impl Selection {
+    /// Returns the sampling radius of radii, none of which may be NaN. O(n): a sample gives two bounds,
+    /// and the few radii between them are selected from (Floyd & Rivest 1975).
+    pub(crate) fn of(&mut self, radii: &[f32]) -> f32 {
+        const SAMPLE: usize = 1 << 10;
+        /// Four standard deviations of the rank of the quantile in a random sample.
+        const MARGIN: usize = 38;
+        /// One in this many radii is expected in each half.
+        const USUAL: usize = 16;
+        let Self { sample, between: [found, more] } = self;
+        sample.clear();
+        sample.extend(radii.iter().step_by(radii.len().div_ceil(SAMPLE)));
+        sample.sort_unstable_by(f32::total_cmp);
+        let place = sampling_rank(sample.len());
+        let bounds = [place.saturating_sub(MARGIN), (place + MARGIN).min(sample.len() - 1)];
+        let bounds = bounds.map(|place| sample[place]);
+        found.clear();
+        more.clear();
+        found.reserve(2 * radii.len() / USUAL);
+        more.reserve(radii.len() / USUAL);
+        let (left, right) = radii.split_at(radii.len() / 2);
+        let (left, right) = both(|| ranks(left, bounds, found), || ranks(right, bounds, more));
+        found.append(more);
+        let [below, to_low, to_high] = [0, 1, 2].map(|k| left[k] + right[k]);
+        let rank = sampling_rank(radii.len());
+        if (below..to_low).contains(&rank) {
+            bounds[0]
+        } else if (to_low..to_low + found.len()).contains(&rank) {
+            *found.select_nth_unstable_by(rank - to_low, f32::total_cmp).1
+        } else if (to_low..to_high).contains(&rank) {
+            bounds[1]
+        } else {
+            // The sample differs from the whole.
+            found.clear();
+            found.extend_from_slice(radii);
+            *found.select_nth_unstable_by(rank, f32::total_cmp).1
+        }
     }
-    f32::from_bits(found)
+}
+
+/// Appends the radii between `low` and `high` to `between`. Returns the numbers of radii that are less
+/// than `low`, at most `low`, and at most `high`.
+fn ranks(radii: &[f32], [low, high]: [f32; 2], between: &mut Vec<f32>) -> [usize; 3] {
+    const AT_ONCE: usize = 256;
+    let (mut kept, mut counts) = ([0.0; AT_ONCE], [0; 3]);
+    for some in radii.chunks(AT_ONCE) {
+        let mut count = 0;
+        for &radius in some {
+            kept[count % AT_ONCE] = radius;
+            count += usize::from(radius > low) & usize::from(radius < high);
+            counts[0] += usize::from(radius < low);
+            counts[1] += usize::from(radius <= low);
+            counts[2] += usize::from(radius <= high);
+        }
+        between.extend_from_slice(&kept[..count]);
+    }
+    counts
 }
 
 /// Returns the index of the sampling radius among `count` ascending radii.
@@ -153,4 +182,37 @@ pub(crate) fn quantile(radii: &[f32], counts: &mut Vec<u32>) -> f32 {
 )]
 pub(crate) fn sampling_rank(count: usize) -> usize {
     ((count - 1) as f64 * SAMPLING_QUANTILE).round() as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::rng;
+    use rand::RngExt;
+
+    use super::*;
+
+    #[test]
+    fn the_sampling_radius_is_that_of_sorted_radii() {
+        let (rng, mut selection) = (&mut rng(5), Selection::default());
+        let mut few: Vec<Vec<f32>> = vec![vec![0.0], vec![2.0, 1.0], vec![1.0; 5000]];
+        // Multiples of the step of the sample: it holds the least radii only, then the greatest.
+        few.extend(
+            [0.0, 9.0].map(|x| (0..10_240_u16).map(|i| if i % 10 == 0 { x } else { f32::from(i) }).collect()),
+        );
+        few.extend([1, 2, 10, 1000].map(|values| {
+            (0..20_000)
+                .map(|_| if rng.random_range(0..10) < 9 { 1.0 } else { rng.random_range(0..=values) as f32 })
+                .collect()
+        }));
+        few.extend(
+            [10, 1023, 1024, 1025, 30_000]
+                .map(|count| (0..count).map(|_| rng.random_range(0.0..1e-20)).collect()),
+        );
+        for radii in few {
+            let mut sorted = radii.clone();
+            sorted.sort_unstable_by(f32::total_cmp);
+            let expected = sorted[sampling_rank(radii.len())];
+            assert_eq!(selection.of(&radii), expected, "of {} radii", radii.len());
+        }
+    }
 }
