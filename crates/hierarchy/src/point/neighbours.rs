@@ -16,7 +16,7 @@ use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{change_each, fill, in_order};
 use nearmiss_lanes::vector::{dot, sub};
-use nearmiss_lanes::wide::{greatest, product, seen_from, sum};
+use nearmiss_lanes::wide::{Vectors, WIDTH, greatest_of_each, product, seen_from, sum_of_each};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::SurfacePlan;
 
@@ -70,22 +70,14 @@ pub(crate) fn groups_in_motion(blocks: &[PointBlock], groups: &mut [PointBlock])
 
 /// Sets `groups` to the balls around `blocks` and their support.
 fn fill_groups(blocks: &[PointBlock], groups: &mut [PointBlock], steps: u8) {
-    const WIDTH: usize = PointBlock::WIDTH;
     const AT_ONCE: usize = 8;
     let level = Level::new();
     change_each(groups, AT_ONCE, |number, group| {
         let blocks = &blocks[number * WIDTH..blocks.len().min((number + 1) * WIDTH)];
-        *group = PointBlock::EMPTY;
-        for (lane, block) in blocks.iter().enumerate() {
-            let (centre, radius) = dispatch!(level, simd => simd.vectorize(
-                #[inline(always)]
-                || ball(simd, block, steps),
-            ));
-            for k in 0..3 {
-                group.position[k][lane] = centre[k];
-            }
-            group.support_radius[lane] = radius;
-        }
+        *group = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || balls(simd, blocks, steps),
+        ));
     });
 }
 
@@ -102,40 +94,75 @@ pub(crate) fn supports(groups: &[PointBlock]) -> Supports {
     Supports { levels }
 }
 
-/// Returns a ball that contains the support balls of all points of a block.
+/// Returns a ball for each of up to sixteen `blocks`. It contains the support balls of all points of the
+/// block.
 #[inline(always)]
-fn ball<S: Simd>(simd: S, block: &PointBlock, steps: u8) -> ([f32; 3], f32) {
-    let PointBlock { position: [x, y, z], support_radius, .. } = block;
-    let support_radii = f32x16::load_array_ref(simd, support_radius);
-    let is_there: mask32x16<S> = support_radii.simd_gt(0.0);
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let count = sum(simd.select_f32x16(is_there, one, zero));
-    let mut centre = [0.0; 3];
-    for k in 0..3 {
-        let row = f32x16::load_array_ref(simd, &block.position[k]);
-        centre[k] = sum(simd.select_f32x16(is_there, row, zero)) / count;
-    }
+fn balls<S: Simd>(simd: S, blocks: &[PointBlock], steps: u8) -> PointBlock {
+    let (zero, infinite) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, f32::INFINITY));
+    let mut centres = means(simd, blocks);
     // The smallest ball of balls: from the mean, ever smaller steps towards the point whose support
     // ball extends furthest.
-    let mut best = (centre, f32::INFINITY);
+    let mut best = (centres, infinite);
     for step in 2..2 + steps {
-        let d = seen_from(simd, &block.position, centre);
-        let outer = product(d, d).sqrt() + support_radii;
-        let outer = simd.select_f32x16(is_there, outer, zero);
-        let radius = greatest(outer, 0.0);
-        if radius < best.1 {
-            best = (centre, radius);
+        let [x, y, z] = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
+        let mut rows = [zero; WIDTH];
+        for (i, block) in blocks.iter().enumerate() {
+            let d = seen_from(simd, &block.position, [x[i], y[i], z[i]]);
+            let support_radii = f32x16::load_array_ref(simd, &block.support_radius);
+            let outer = product(d, d).sqrt() + support_radii;
+            rows[i] = simd.select_f32x16(support_radii.simd_gt(0.0), outer, zero);
         }
-        let furthest: mask32x16<S> = outer.simd_eq(radius);
-        let i = furthest.to_bitmask().trailing_zeros() as usize % PointBlock::WIDTH;
+        let radii = greatest_of_each(rows);
+        let wide = f32x16::load_array(simd, radii);
+        let is_better: mask32x16<S> = wide.simd_lt(best.1);
+        best.1 = simd.select_f32x16(is_better, wide, best.1);
         let share = 1.0 / f32::from(step);
-        for (c, p) in centre.iter_mut().zip([x[i], y[i], z[i]]) {
-            *c += share * (p - *c);
+        let mut furthest = [[0.0; WIDTH]; 3];
+        for (i, block) in blocks.iter().enumerate() {
+            let is_furthest: mask32x16<S> = rows[i].simd_eq(radii[i]);
+            let place = is_furthest.to_bitmask().trailing_zeros() as usize % WIDTH;
+            for k in 0..3 {
+                furthest[k][i] = block.position[k][place];
+            }
+        }
+        for k in 0..3 {
+            best.0[k] = simd.select_f32x16(is_better, centres[k], best.0[k]);
+            let furthest = f32x16::load_array(simd, furthest[k]);
+            centres[k] += (furthest - centres[k]) * share;
         }
     }
-    let (centre, radius) = best;
-    let far = centre.iter().fold(radius, |far, c| far.max(c.abs()));
-    (centre, radius * GROWN + ROUNDING * far)
+    let (centres, radii) = best;
+    let far = centres[0].abs().max(centres[1].abs()).max(centres[2].abs()).max(radii);
+    let radii = (radii * GROWN + far * ROUNDING).to_array();
+    let mut found = PointBlock::EMPTY;
+    let count = blocks.len().min(WIDTH);
+    found.support_radius[..count].copy_from_slice(&radii[..count]);
+    for k in 0..3 {
+        found.position[k][..count].copy_from_slice(&centres[k].to_array()[..count]);
+    }
+    found
+}
+
+/// Returns the means of the points of each of up to sixteen `blocks`.
+#[inline(always)]
+fn means<S: Simd>(simd: S, blocks: &[PointBlock]) -> Vectors<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let mut rows = [[zero; WIDTH]; 4];
+    for (i, block) in blocks.iter().enumerate() {
+        let is_there: mask32x16<S> = f32x16::load_array_ref(simd, &block.support_radius).simd_gt(0.0);
+        for k in 0..3 {
+            let row = f32x16::load_array_ref(simd, &block.position[k]);
+            rows[k][i] = simd.select_f32x16(is_there, row, zero);
+        }
+        rows[3][i] = simd.select_f32x16(is_there, one, zero);
+    }
+    let [x, y, z, counts] = rows;
+    let share = one / f32x16::load_array(simd, sum_of_each(counts)).max(one);
+    [
+        f32x16::load_array(simd, sum_of_each(x)) * share,
+        f32x16::load_array(simd, sum_of_each(y)) * share,
+        f32x16::load_array(simd, sum_of_each(z)) * share,
+    ]
 }
 
 /// The lists of some blocks, in order.
@@ -218,7 +245,6 @@ impl Locality {
     /// Gathers the balls around the blocks, for [`Self::supporting`].
     #[inline(always)]
     pub(crate) fn gather_balls(&mut self, index: &Index<'_>) {
-        const WIDTH: usize = PointBlock::WIDTH;
         self.balls.clear();
         self.balls.resize(self.blocks.len().div_ceil(WIDTH), PointBlock::EMPTY);
         for (i, &block) in self.blocks.iter().enumerate() {
@@ -242,7 +268,6 @@ impl Locality {
         distance: f32,
         places: &'p mut Vec<u32>,
     ) -> &'p mut [u32] {
-        const WIDTH: usize = PointBlock::WIDTH;
         let most = (self.balls.len() + 1) * WIDTH;
         if places.len() < most {
             places.resize(most, 0);
