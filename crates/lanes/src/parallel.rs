@@ -241,9 +241,7 @@ macro_rules! divide_tuples {
     };
 }
 divide_tuples!(A 0, B 1);
-divide_tuples!(A 0, B 1, C 2);
 divide_tuples!(A 0, B 1, C 2, D 3);
-divide_tuples!(A 0, B 1, C 2, D 3, E 4);
 divide_tuples!(A 0, B 1, C 2, D 3, E 4, F 5);
 
 /// Passes ranges of `items` with the `parts` of several arrays that belong to them to `f`, which changes

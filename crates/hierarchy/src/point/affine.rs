@@ -39,12 +39,19 @@ pub(crate) struct Motion {
     pub(crate) is_carried: bool,
 }
 
-/// Points or normals side by side.
-pub(crate) type Lanes = [[f32; WIDTH]; 3];
+/// Up to sixteen points of a leaf at rest, side by side.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct RestLanes {
+    /// Relative to the middle of the leaf; zero in surplus lanes.
+    positions: [[f32; WIDTH]; 3],
+    normals: [[f32; WIDTH]; 3],
+    /// Local radii; infinite in surplus lanes.
+    radii: [f32; WIDTH],
+}
 
 /// Puts up to sixteen vectors side by side. Surplus lanes have the vector `rest`.
 #[inline(always)]
-pub(crate) fn side_by_side(vectors: &[[f32; 3]], rest: [f32; 3]) -> Lanes {
+fn side_by_side(vectors: &[[f32; 3]], rest: [f32; 3]) -> [[f32; WIDTH]; 3] {
     let mut lanes = [[rest[0]; WIDTH], [rest[1]; WIDTH], [rest[2]; WIDTH]];
     spread_out(vectors, &mut lanes);
     lanes
@@ -92,27 +99,32 @@ impl Rest {
         Self { middle, inverse, ridge, normal }
     }
 
-    /// Returns the points at rest relative to their middle, side by side. Surplus lanes are zero.
-    pub(crate) fn relative(&self, points: &[[f32; 3]]) -> impl Iterator<Item = Lanes> {
-        points.chunks(WIDTH).map(|points| {
-            let mut lanes = side_by_side(points, self.middle);
-            for k in 0..3 {
-                lanes[k].iter_mut().for_each(|c| *c -= self.middle[k]);
+    /// Sets `lanes` to the points of this leaf.
+    pub(crate) fn spread(
+        &self,
+        (points, normals, radii): (&[[f32; 3]], &[[f32; 3]], &[f32]),
+        lanes: &mut [RestLanes],
+    ) {
+        let all = points.chunks(WIDTH).zip(normals.chunks(WIDTH)).zip(radii.chunks(WIDTH));
+        for (((points, normals), radii), lanes) in all.zip(lanes) {
+            lanes.positions = side_by_side(points, self.middle);
+            for (row, middle) in lanes.positions.iter_mut().zip(self.middle) {
+                row.iter_mut().for_each(|c| *c -= middle);
             }
-            lanes
-        })
+            lanes.normals = side_by_side(normals, [0.0; 3]);
+            lanes.radii = [f32::INFINITY; WIDTH];
+            lanes.radii[..radii.len()].copy_from_slice(radii);
+        }
     }
 
-    /// Fits the motion from `points`, at rest and [relative](Self::relative), to the places `now`. For a
-    /// leaf that is carried along, the spacing changes by at most the factor `most` or its reciprocal, and
+    /// Fits the motion from `points`, at rest, to the places `now`. For a leaf that is carried along, the spacing changes by at most the factor `most` or its reciprocal, and
     /// so does the ratio of a length to the spacing. Each point is within `off` of its radius of its place.
     #[inline(always)]
     pub(crate) fn motion<S: Simd>(
         &self,
         simd: S,
-        points: &[Lanes],
+        points: &[RestLanes],
         now: &[[f32; 3]],
-        radii: &[f32],
         (most, off): (f32, f32),
     ) -> Motion {
         let (first, mut places) = (now[0], [[[0.0; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH]);
@@ -135,7 +147,7 @@ impl Rest {
         // Rows of Σ (q − q̄)(p − p̄)ᵀ.
         let mut products = [f32x16::splat(simd, 0.0); WIDTH];
         for (points, places) in points.iter().zip(&places) {
-            let (p, q) = (load(simd, points), seen_from(simd, places, middle));
+            let (p, q) = (load(simd, &points.positions), seen_from(simd, places, middle));
             for i in 0..3 {
                 for k in 0..3 {
                     products[3 * i + k] += q[i] * p[k];
@@ -162,11 +174,9 @@ impl Rest {
         let [low, high] = [(mean - apart).max(0.0).sqrt(), (mean + apart).sqrt()];
         let spacing = (low * high).sqrt();
         let mut is_carried = spacing * most >= 1.0 && spacing <= most && high <= most * spacing;
-        for ((points, places), radii) in points.iter().zip(&places).zip(radii.chunks(WIDTH)) {
-            let mut within = [f32::INFINITY; WIDTH];
-            within[..radii.len()].copy_from_slice(radii);
-            let within = f32x16::load_array_ref(simd, &within) * off;
-            let (p, mut d) = (load(simd, points), seen_from(simd, places, middle));
+        for (points, places) in points.iter().zip(&places) {
+            let within = f32x16::load_array_ref(simd, &points.radii) * off;
+            let (p, mut d) = (load(simd, &points.positions), seen_from(simd, places, middle));
             for k in 0..3 {
                 d[k] -= along(p, linear[k]);
             }
@@ -185,14 +195,30 @@ impl Rest {
 }
 
 impl Motion {
-    /// Sets `normals` to where the unit normals `before` point after the motion. If the motion
-    /// flattens the plane of one, that stays.
+    /// Moves the unit normals and the local radii of a leaf, which are `before` at rest. A normal stays if
+    /// the motion flattens its plane. No radius exceeds `most`.
     #[inline(always)]
-    pub(crate) fn turn<S: Simd>(&self, simd: S, before: &[Lanes], normals: &mut [[f32; 3]]) {
+    pub(crate) fn carry<S: Simd>(
+        &self,
+        simd: S,
+        before: &[RestLanes],
+        (normals, radii): (&mut [[f32; 3]], &mut [f32]),
+        most: f32,
+    ) {
         let [x, y, z] = &self.cofactors;
+        // Where points are fitted anew, their neighbours are compared with these radii.
+        let spacing = if self.spacing.is_finite() { self.spacing } else { 1.0 };
         let mut rows = [[0.0; WIDTH]; 3];
-        for (before, normals) in before.iter().zip(normals.chunks_mut(WIDTH)) {
-            let n = load(simd, before);
+        let moved = normals.chunks_mut(WIDTH).zip(radii.chunks_mut(WIDTH));
+        for (before, (normals, radii)) in before.iter().zip(moved) {
+            let moved =
+                (f32x16::load_array_ref(simd, &before.radii) * spacing).min(f32x16::splat(simd, most));
+            let moved = moved.to_array();
+            match radii.as_mut_array() {
+                Some(radii) => *radii = moved,
+                None => radii.copy_from_slice(&moved[..radii.len()]),
+            }
+            let n = load(simd, &before.normals);
             let mut turned = n;
             for k in 0..3 {
                 turned[k] = along(n, [x[k], y[k], z[k]]);
@@ -219,9 +245,13 @@ mod tests {
     /// Returns where a normal points, taken among others.
     fn turned(motion: &Motion, normal: [f32; 3]) -> [f32; 3] {
         let before: Vec<[f32; 3]> = (0..20).map(|i| if i == 17 { normal } else { [0.0, 1.0, 0.0] }).collect();
-        let mut normals = vec![[f32::NAN; 3]; 20];
-        let before: Vec<Lanes> = before.chunks(WIDTH).map(|before| side_by_side(before, [0.0; 3])).collect();
-        dispatch!(Level::new(), simd => motion.turn(simd, &before, &mut normals));
+        let (mut normals, mut radii) = (vec![[f32::NAN; 3]; 20], vec![f32::NAN; 20]);
+        let mut lanes = [RestLanes::default(); 2];
+        Rest::default().spread((&before, &before, &[0.5; 20]), &mut lanes);
+        let moved = (&mut normals[..], &mut radii[..]);
+        dispatch!(Level::new(), simd => motion.carry(simd, &lanes, moved, 0.6));
+        let expected = if motion.spacing.is_finite() { (0.5 * motion.spacing).min(0.6) } else { 0.5 };
+        assert!(radii.iter().all(|r| *r == expected), "{radii:?}");
         normals[17]
     }
 
@@ -231,11 +261,11 @@ mod tests {
     }
 
     fn motion_by(f: impl Fn([f32; 3]) -> [f32; 3]) -> Motion {
-        let points = patch();
-        let rest = Rest::new(&points, &[[0.0, 0.0, 1.0]; 16]);
+        let (points, normals) = (patch(), [[0.0, 0.0, 1.0]; 16]);
+        let (rest, mut lanes) = (Rest::new(&points, &normals), [RestLanes::default()]);
+        rest.spread((&points, &normals, &[1.4; 16]), &mut lanes);
         let now: Vec<[f32; 3]> = points.iter().map(|p| f(*p)).collect();
-        let points: Vec<Lanes> = rest.relative(&points).collect();
-        dispatch!(Level::new(), simd => rest.motion(simd, &points, &now, &[1.4; 16], (1.25, 0.2)))
+        dispatch!(Level::new(), simd => rest.motion(simd, &lanes, &now, (1.25, 0.2)))
     }
 
     fn is_near(a: [f32; 3], b: [f32; 3]) -> bool {

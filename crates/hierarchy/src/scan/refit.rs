@@ -11,7 +11,7 @@ use nearmiss_lanes::wide::blocks_of;
 use crate::patch::alignment::align;
 use crate::patch::classes::votes;
 use crate::patch::surfels::{Fit, fits_of, gaps_of};
-use crate::point::affine::{Lanes, Motion, Rest, side_by_side};
+use crate::point::affine::{Motion, Rest, RestLanes};
 use crate::point::disc::PointCode;
 use crate::point::gather::Index;
 use crate::point::neighbours::supports;
@@ -54,19 +54,21 @@ pub(crate) struct NextFrame<'a> {
     pub(crate) step: f64,
 }
 
+/// A leaf when it was last fitted, and its motion since.
+#[derive(Debug, Clone, Copy, Default)]
+struct Leaf {
+    rest: Rest,
+    motion: Motion,
+}
+
 /// The points as they were when last fitted, and reused memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Memory {
-    /// `true` if the scan is as it was when last fitted, and the state at rest below is not up to
-    /// date.
+    /// `true` if the scan is as it was when last fitted, so that all leaves rest where they are.
     is_fresh: bool,
-    /// Positions relative to the middle of their leaf, and normals, side by side: as many lanes for each
-    /// leaf.
-    positions: Vec<Lanes>,
-    normals: Vec<Lanes>,
-    radii: Vec<f32>,
-    leaves: Vec<Rest>,
-    motions: Vec<Motion>,
+    leaves: Vec<Leaf>,
+    /// The points of the leaves, as many lanes for each.
+    lanes: Vec<RestLanes>,
     /// The leaves to fit anew.
     changed: Vec<u32>,
     pub(crate) closing: Closing,
@@ -84,44 +86,17 @@ impl Memory {
     }
 
     /// Takes the scan for its state at rest if it has just been fitted.
-    fn settle(&mut self, scan: &PointHierarchy) {
-        if !std::mem::take(&mut self.is_fresh) {
-            return;
+    fn settle(&mut self, topology: &Topology) {
+        if std::mem::take(&mut self.is_fresh) {
+            self.leaves.clear();
+            self.leaves.resize(topology.leaves(), Leaf::default());
+            self.lanes.resize(topology.leaves() * lanes_a_leaf(topology), RestLanes::default());
         }
-        let topology = scan.topology();
-        let each = lanes_a_leaf(topology);
-        self.positions.resize(topology.leaves() * each, Lanes::default());
-        self.normals.resize(topology.leaves() * each, Lanes::default());
-        self.radii.clear();
-        self.radii.extend_from_slice(scan.radii());
-        self.leaves.resize(topology.leaves(), Rest::default());
-        self.motions.resize(topology.leaves(), Motion::default());
-        let Self { positions, normals, leaves, .. } = self;
-        let parts = (runs(leaves, 1), runs(positions, each), runs(normals, each));
-        change_together(0..topology.leaves(), WIDTH, parts, &|items, (leaves, positions, normals)| {
-            let lanes = positions.elements.chunks_mut(each).zip(normals.elements.chunks_mut(each));
-            for ((leaf, rest), lanes) in items.zip(leaves.elements).zip(lanes) {
-                *rest = rest_of(scan, leaf, lanes);
-            }
-        });
     }
 
     /// Returns `true` if a leaf is to be fitted anew.
     fn is_changed(&self, leaf: usize) -> bool {
-        !self.motions[leaf].is_carried
-    }
-
-    /// Takes the `changed` leaves as they are in `scan` for their state at rest.
-    fn rest(&mut self, scan: &PointHierarchy, changed: &[u32]) {
-        let each = lanes_a_leaf(scan.topology());
-        let Self { positions, normals, radii, leaves, .. } = self;
-        for &leaf in changed {
-            let leaf = leaf as usize;
-            let lanes = leaf * each..(leaf + 1) * each;
-            leaves[leaf] = rest_of(scan, leaf, (&mut positions[lanes.clone()], &mut normals[lanes]));
-            let points = scan.topology().points_of_leaf(leaf);
-            radii[points.clone()].copy_from_slice(&scan.radii()[points]);
-        }
+        !self.leaves[leaf].motion.is_carried
     }
 }
 
@@ -130,22 +105,9 @@ const fn lanes_a_leaf(topology: &Topology) -> usize {
     topology.leaf_size().div_ceil(WIDTH)
 }
 
-/// Returns a leaf of `scan` at rest, and sets its positions and normals.
-fn rest_of(scan: &PointHierarchy, leaf: usize, (positions, normals): (&mut [Lanes], &mut [Lanes])) -> Rest {
-    let points = scan.topology().points_of_leaf(leaf);
-    let (own, of_own) = (&scan.positions()[points.clone()], &scan.normals()[points]);
-    let rest = Rest::new(own, of_own);
-    positions.iter_mut().zip(rest.relative(own)).for_each(|(lanes, now)| *lanes = now);
-    normals
-        .iter_mut()
-        .zip(of_own.chunks(WIDTH))
-        .for_each(|(lanes, now)| *lanes = side_by_side(now, [0.0; 3]));
-    rest
-}
-
 /// Moves the points of `scan`.
 pub(crate) fn refit(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>) -> Refitted {
-    memory.settle(scan);
+    memory.settle(&scan.topology);
     carry(scan, memory, placed);
     let mut changed = std::mem::take(&mut memory.changed);
     changed.clear();
@@ -187,70 +149,74 @@ fn carry(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>)
     let meta = &mut scan.meta;
     (meta.frame, meta.bounds, meta.step) = (placed.frame, placed.bounds, placed.step);
     let (topology, leaf_size, arrays) = (scan.topology, scan.topology.leaf_size(), &mut scan.arrays);
-    let Memory { positions, normals, radii, leaves, motions, .. } = memory;
-    let rest = AtRest { positions, normals, radii, leaves, source: &arrays.source, reach: meta.reach };
     let Some(positions) = scan.positions.get_mut() else { return };
+    let moves = Moves { placed, source: &arrays.source, reach: meta.reach, leaf_size };
     // The points of sixteen leaves fill whole blocks.
     let points = WIDTH * leaf_size;
     let moved = (
         runs(positions.to_mut(), points),
         runs(arrays.blocks.to_mut(), leaf_size),
-        runs(motions, WIDTH),
         runs(arrays.normals.to_mut(), points),
         runs(arrays.radii.to_mut(), points),
+        runs(&mut memory.leaves, WIDTH),
+        runs(&mut memory.lanes, WIDTH * lanes_a_leaf(&topology)),
     );
     let level = Level::new();
     change_together(0..topology.leaves().div_ceil(WIDTH), AT_ONCE, moved, &|items, moved| {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || rest.carry(simd, placed, (leaf_size, items.start * WIDTH), moved),
+            || moves.carry(simd, items.start * points, moved),
         ));
     });
 }
 
-/// Parts of the positions, blocks, motions, normals and radii that move.
-type Moved<'a> =
-    (Runs<'a, [f32; 3]>, Runs<'a, PointBlock>, Runs<'a, Motion>, Runs<'a, [f32; 3]>, Runs<'a, f32>);
+/// Parts of the positions, blocks, normals, radii and leaves that move, and of the leaves at rest.
+type Moved<'a> = (
+    Runs<'a, [f32; 3]>,
+    Runs<'a, PointBlock>,
+    Runs<'a, [f32; 3]>,
+    Runs<'a, f32>,
+    Runs<'a, Leaf>,
+    Runs<'a, RestLanes>,
+);
 
-/// The state at rest that motions start from.
-struct AtRest<'a> {
-    positions: &'a [Lanes],
-    normals: &'a [Lanes],
-    radii: &'a [f32],
-    leaves: &'a [Rest],
+/// How points move into a frame.
+struct Moves<'a> {
+    placed: &'a NextFrame<'a>,
     source: &'a [u32],
     reach: f32,
+    leaf_size: usize,
 }
 
-impl AtRest<'_> {
-    /// Moves some leaves with `leaf_size` points each, from the leaf `first` on.
+impl Moves<'_> {
+    /// Moves some leaves, from the point `start` on. Those that were fitted in the frame before rest there.
     #[inline(always)]
     fn carry<S: Simd>(
         &self,
         simd: S,
-        NextFrame { points, frame, .. }: &NextFrame<'_>,
-        (leaf_size, first): (usize, usize),
-        (positions, blocks, motions, normals, radii): Moved<'_>,
+        start: usize,
+        (positions, blocks, normals, radii, leaves, lanes): Moved<'_>,
     ) {
-        let (start, each) = (first * leaf_size, leaf_size.div_ceil(WIDTH));
+        let (leaf_size, NextFrame { points, frame, .. }) = (self.leaf_size, self.placed);
+        let (all, each) = (positions.elements.len(), leaf_size.div_ceil(WIDTH));
+        let of_leaf = |leaf: usize| leaf * leaf_size..all.min((leaf + 1) * leaf_size);
+        for (k, leaf) in leaves.elements.iter_mut().enumerate().filter(|(_, leaf)| !leaf.motion.is_carried) {
+            let own = (&positions.elements[of_leaf(k)], &normals.elements[of_leaf(k)]);
+            leaf.rest = Rest::new(own.0, own.1);
+            let own = (own.0, own.1, &radii.elements[of_leaf(k)]);
+            leaf.rest.spread(own, &mut lanes.elements[k * each..(k + 1) * each]);
+        }
         for (now, source) in positions.elements.iter_mut().zip(&self.source[start..]) {
             *now = frame.to_local(points[*source as usize]);
         }
         for (block, points) in blocks.elements.iter_mut().zip(positions.elements.chunks(WIDTH)) {
             block.place(points);
         }
-        for (leaf, motion) in motions.elements.iter_mut().enumerate() {
-            let own = leaf * leaf_size..positions.elements.len().min((leaf + 1) * leaf_size);
-            let radii_before = &self.radii[start + own.start..start + own.end];
-            let lanes = (first + leaf) * each..(first + leaf + 1) * each;
-            let (rest, now) = (&self.positions[lanes.clone()], &positions.elements[own.clone()]);
-            *motion = self.leaves[first + leaf].motion(simd, rest, now, radii_before, (STRETCH, OFF));
-            motion.turn(simd, &self.normals[lanes], &mut normals.elements[own.clone()]);
-            // Where points are fitted anew, this is what their neighbours are compared with.
-            let spacing = if motion.spacing.is_finite() { motion.spacing } else { 1.0 };
-            for (now, before) in radii.elements[own].iter_mut().zip(radii_before) {
-                *now = (before * spacing).min(self.reach);
-            }
+        for (k, leaf) in leaves.elements.iter_mut().enumerate() {
+            let rest = &lanes.elements[k * each..(k + 1) * each];
+            leaf.motion = leaf.rest.motion(simd, rest, &positions.elements[of_leaf(k)], (STRETCH, OFF));
+            let moved = (&mut normals.elements[of_leaf(k)], &mut radii.elements[of_leaf(k)]);
+            leaf.motion.carry(simd, rest, moved, self.reach);
         }
     }
 }
@@ -282,11 +248,10 @@ fn space(
     }
 }
 
-/// Fits the surface at the points of the `changed` leaves, which have these `blocks`, anew, and takes
-/// them as they are then for their state at rest.
+/// Fits the surface at the points of the `changed` leaves, which have these `blocks`, anew.
 fn fit(
     scan: &mut PointHierarchy,
-    memory: &mut Memory,
+    memory: &Memory,
     (boxes, blocks): (&BlockBoxes, &[u32]),
     changed: &[u32],
     looks: &(impl Fn(usize) -> Look + Sync + Send),
@@ -335,7 +300,6 @@ fn fit(
         let normals = scan.arrays.normals.to_mut();
         changed.iter().for_each(|leaf| align(&mut normals[topology.points_of_leaf(*leaf as usize)]));
     }
-    memory.rest(scan, changed);
 }
 
 /// Sets normals, classes and gaps of points. Unknown gaps are set to 0.
