@@ -20,10 +20,11 @@ pub struct Growth {
 }
 
 /// Returns the upper half of a length, rounded up; [`BOUNDLESS`] for NaN.
-#[inline]
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a half")]
 fn up(length: f32) -> u16 {
     let bits = if length <= f32::MAX { length.max(0.0).to_bits() } else { f32::INFINITY.to_bits() };
-    u16::try_from(bits.saturating_add(0xffff) >> 16).unwrap_or(BOUNDLESS).min(BOUNDLESS)
+    ((bits + 0xffff) >> 16) as u16
 }
 
 /// Infinity: a box with this growth is disjoint from nothing.
@@ -51,14 +52,13 @@ impl Growth {
             far = far.max(low[k].abs()).max(high[k].abs());
         }
         let more = ROUNDING * far;
-        // Not `max`, which would turn NaN into zero.
-        let side = |beyond: f32| up(if beyond < 0.0 { more } else { beyond + more });
-        let mut growth = Self { low: [BOUNDLESS; 3], high: [BOUNDLESS; 3] };
+        // Not `max`, which would turn NaN into zero. Nothing here branches.
+        let side = |beyond: f32| up(if beyond < 0.0 { 0.0 } else { beyond } + more);
+        let mut growth = Self::NONE;
         for k in 0..3 {
-            if low[k] <= high[k] {
-                growth.low[k] = side(own[k][0] - low[k]);
-                growth.high[k] = side(high[k] - own[k][1]);
-            }
+            let is_sound = low[k] <= high[k];
+            growth.low[k] = if is_sound { side(own[k][0] - low[k]) } else { BOUNDLESS };
+            growth.high[k] = if is_sound { side(high[k] - own[k][1]) } else { BOUNDLESS };
         }
         growth
     }

@@ -197,7 +197,8 @@ impl Moves<'_> {
         start: usize,
         (positions, blocks, normals, radii, leaves, lanes): Moved<'_>,
     ) {
-        let (leaf_size, NextFrame { points, frame, .. }) = (self.leaf_size, self.placed);
+        // A copy, as the loop below may not change it.
+        let (leaf_size, points, frame) = (self.leaf_size, self.placed.points, self.placed.frame);
         let (all, each) = (positions.elements.len(), leaf_size.div_ceil(WIDTH));
         let of_leaf = |leaf: usize| leaf * leaf_size..all.min((leaf + 1) * leaf_size);
         for (k, leaf) in leaves.elements.iter_mut().enumerate().filter(|(_, leaf)| !leaf.motion.is_carried) {
