@@ -97,7 +97,7 @@ impl DistancePlan {
         Self::of_metrics(options, [metric; 2])
     }
 
-    fn of_metrics(options: &DistanceOptions, metrics: [Metric; 2]) -> Result<Self, PlanError> {
+    pub(crate) fn of_metrics(options: &DistanceOptions, metrics: [Metric; 2]) -> Result<Self, PlanError> {
         if !(0.0..1.0).contains(&options.relative) {
             return Err(PlanError::Relative(options.relative));
         }

@@ -8,7 +8,10 @@ mod handle;
 mod pointer;
 pub mod status;
 
+pub mod file;
 pub mod pose;
+
+pub mod mesh;
 pub mod scan;
 
 pub mod hint;

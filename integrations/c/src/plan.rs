@@ -1,7 +1,11 @@
 //! Plans: validated options.
 
-use nearmiss::{CollidePlan, DistanceOptions, DistancePlan, ShapePlan, SweepOptions, SweepPlan};
 use std::mem::MaybeUninit;
+
+use nearmiss::{
+    CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Metric, PlanError, ShapePlan, SweepOptions,
+    SweepPlan,
+};
 
 use crate::handle::{Handle, free, get, make, opaque};
 use crate::options::{Options, nearmiss_options};
@@ -25,7 +29,8 @@ pub struct Plan(Handle<Plans>);
 opaque!(Plan of Plans as b"nm-plan.");
 
 /// Validates options, for `a` and `b` and all scans prepared for the same kernel. `options` may be
-/// null. Thread safety: any thread.
+/// null. Both scans may be null, for a world whose scans, if any, have the default kernel. Thread safety: any
+/// thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_plan_new(
     options: Option<&Options>,
@@ -35,24 +40,49 @@ pub extern "C" fn nearmiss_plan_new(
 ) -> Status {
     guard(|| {
         make(out, || {
-            let (options, a, b) =
-                (options.copied().unwrap_or_else(|| nearmiss_options()), get(a, "a")?, get(b, "b")?);
+            let options = options.copied().unwrap_or_else(|| nearmiss_options());
+            let scans = match (a, b) {
+                (None, None) => None,
+                _ => Some((get(a, "a")?, get(b, "b")?)),
+            };
             let mut asked = options.collide()?;
-            if a.metric() == nearmiss::Metric::Geodesic && options.semantics == 0 {
+            let is_geodesic = scans.is_some_and(|(a, _)| a.metric() == Metric::Geodesic);
+            if is_geodesic && options.semantics == 0 {
                 asked = asked.with_semantics(nearmiss::Semantics::Surface);
             }
             let distance =
                 DistanceOptions::default().with_semantics(asked.semantics).with_relative(options.relative);
             let sweep =
                 SweepOptions::default().with_semantics(asked.semantics).with_clearance(options.margin);
-            Ok(Plans {
-                collide: CollidePlan::new(&asked, a, b).map_err(Failure::argument)?,
-                distance: DistancePlan::new(&distance, a, b).map_err(Failure::argument)?,
-                shape: ShapePlan::new(&asked, a).map_err(Failure::argument)?,
-                sweep: SweepPlan::new(&sweep, a, b).map_err(Failure::argument)?,
-            })
+            Plans::new(&asked, &distance, &sweep, scans).map_err(Failure::argument)
         })
     })
+}
+
+impl Plans {
+    /// The plans for two scans, or for any scans with the default kernel.
+    fn new(
+        collide: &CollideOptions,
+        distance: &DistanceOptions,
+        sweep: &SweepOptions,
+        scans: Option<(&nearmiss::Scan, &nearmiss::Scan)>,
+    ) -> Result<Self, PlanError> {
+        let Some((a, b)) = scans else {
+            let metric = Metric::Euclidean;
+            return Ok(Self {
+                collide: CollidePlan::of_metric(collide, metric)?,
+                distance: DistancePlan::of_metric(distance, metric)?,
+                shape: ShapePlan::of_metric(collide, metric)?,
+                sweep: SweepPlan::of_metric(sweep, metric)?,
+            });
+        };
+        Ok(Self {
+            collide: CollidePlan::new(collide, a, b)?,
+            distance: DistancePlan::new(distance, a, b)?,
+            shape: ShapePlan::new(collide, a)?,
+            sweep: SweepPlan::new(sweep, a, b)?,
+        })
+    }
 }
 
 /// Frees a plan; null is fine. Thread safety: no other call may use the handle at the same time or

@@ -3,10 +3,9 @@
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
 
-use nearmiss::io::ReadError;
-use nearmiss::store::{ContainerFault, OpenError, WriteError};
-use nearmiss::{BuildOptions, Check, CloudError, GraphOptions, LoadError, PointCloud};
+use nearmiss::{BuildOptions, CloudError, GraphOptions, PointCloud};
 
+use crate::file::{check, unloadable, unreadable, unwritable};
 use crate::handle::{Handle, free, get, make, opaque};
 use crate::pointer::{fill, path, slice, write};
 use crate::status::{Failure, Status, guard};
@@ -29,16 +28,6 @@ pub struct PrepareOptions {
     pub drop_invalid: i32,
     /// Not 0: a graph over the points turns the normals outwards. Takes as long again.
     pub graph: i32,
-}
-
-/// How the bytes of a prepared scan are checked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(i32)]
-pub enum Checks {
-    /// Checksums and every number.
-    Full = 0,
-    /// The layout, for files from a trusted source; takes the same time for any scan.
-    Structure = 1,
 }
 
 /// Facts about a scan. Lengths are in the units of its input.
@@ -163,30 +152,6 @@ pub unsafe extern "C" fn nearmiss_scan_read(
             prepare(&model.cloud, options.unwrap_or(&DEFAULT))
         })
     })
-}
-
-fn unreadable(cause: ReadError) -> Failure {
-    let is_of_system = matches!(cause, ReadError::Io { .. } | ReadError::NotAFile { .. });
-    Failure::new(if is_of_system { Status::Io } else { Status::Data }, cause)
-}
-
-fn unloadable(cause: LoadError) -> Failure {
-    let is_of_system = matches!(cause, LoadError::Open(OpenError { fault: ContainerFault::Io { .. }, .. }));
-    Failure::new(if is_of_system { Status::Io } else { Status::Data }, cause)
-}
-
-fn unwritable(cause: WriteError) -> Failure {
-    Failure::new(Status::Io, cause)
-}
-
-fn check(checks: i32) -> Result<Check, Failure> {
-    match checks {
-        0 => Ok(Check::Full),
-        1 => Ok(Check::Structure),
-        other => {
-            Err(Failure::argument(format_args!("expected checks of 0 (full) or 1 (structure), got {other}")))
-        }
-    }
 }
 
 /// Opens a prepared file by mapping it; `checks` is a `NearmissChecks`. The file must not be changed in

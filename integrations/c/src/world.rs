@@ -1,6 +1,5 @@
-//! Worlds: many placed scans and shapes.
+//! Worlds: many placed scans, meshes and shapes.
 
-use std::convert::Infallible;
 use std::mem::MaybeUninit;
 
 use nearmiss::{Bodies, BodyId};
@@ -8,6 +7,7 @@ use nearmiss::{Bodies, BodyId};
 use crate::answer::{Answer, NOWHERE};
 use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::hint::Hint;
+use crate::mesh::Mesh;
 use crate::options::{Budget, budget};
 use crate::plan::Plan;
 use crate::pointer::{fill, required, slice, write};
@@ -19,9 +19,9 @@ use crate::status::{Failure, Status, guard};
 /// The bodies of a world.
 ///
 /// cbindgen:ignore
-type Crowd = nearmiss::World<nearmiss::Scan, Infallible, OwnShape>;
+type Crowd = nearmiss::World<nearmiss::Scan, nearmiss::Mesh, OwnShape>;
 
-/// Placed scans and convex shapes, each a body with an id. Any number of threads may ask at the same time,
+/// Placed scans, meshes and convex shapes, each a body with an id. Any number of threads may ask at the same time,
 /// while none changes it.
 #[derive(Debug)]
 pub struct World(Handle<Crowd>);
@@ -80,7 +80,7 @@ fn no_body(id: u64) -> Failure {
 /// Makes an empty world. Thread safety: any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_new(out: Option<&mut MaybeUninit<*mut World>>) -> Status {
-    guard(|| make(out, || Ok(Crowd::with_shapes())))
+    guard(|| make(out, || Ok(Crowd::with_meshes_and_shapes())))
 }
 
 /// Frees a world; null is fine. Thread safety: no other call may use the handle at the same time or
@@ -107,6 +107,24 @@ pub extern "C" fn nearmiss_world_insert(
         let (scan, pose) = (get(placed.scan, "scan")?, placed.pose.checked()?);
         let out = out.ok_or_else(|| Failure::null("out"))?;
         write(Some(out), world.insert(scan.clone(), &pose).0)
+    })
+}
+
+/// Adds a mesh and writes its id to `out`. `pose` maps the frame of its vertices to the world; null leaves it
+/// where it is. The world keeps the mesh; its handle may be freed. Thread safety: no other call may use the
+/// world at the same time.
+#[unsafe(no_mangle)]
+pub extern "C" fn nearmiss_world_insert_mesh(
+    world: Option<&mut World>,
+    mesh: Option<&Mesh>,
+    pose: Option<&Pose>,
+    out: Option<&mut MaybeUninit<u64>>,
+) -> Status {
+    guard(|| {
+        let (world, mesh) = (get_mut(world, "world")?, get(mesh, "mesh")?);
+        let pose = pose.map_or(Ok(nearmiss::Pose::IDENTITY), Pose::checked)?;
+        let out = out.ok_or_else(|| Failure::null("out"))?;
+        write(Some(out), world.insert_mesh(mesh.clone(), &pose).0)
     })
 }
 
@@ -181,8 +199,8 @@ pub unsafe extern "C" fn nearmiss_world_near_pairs(
 }
 
 /// Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
-/// `nearmiss_touch` does, and two shapes exactly. `limits` and `hint` count for two scans only. An answer
-/// about a shape has no normals. Thread safety: one call at a time for each scratch and each hint.
+/// `nearmiss_touch` does, a scan and a mesh as two scans, and other pairs exactly. A mesh is its triangles
+/// without an inside. `hint` counts for two scans only. Answers about shapes and meshes have no normals. Thread safety: one call at a time for each scratch and each hint.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_collide(
     world: Option<&World>,

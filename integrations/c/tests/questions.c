@@ -256,6 +256,84 @@ static void worlds_of_shapes(void) {
     OK(nearmiss_world_free(world));
 }
 
+/* A box of triangles beside a scan, a ball and another box. */
+static void worlds_of_meshes(void) {
+    double corners[24];
+    uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                          2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    for (int i = 0; i < 8; i++) {
+        corners[3 * i] = 0.1 * (i & 1), corners[3 * i + 1] = 0.1 * (i >> 1 & 1), corners[3 * i + 2] = 0.1 * (i >> 2);
+    }
+    NearmissMesh *cube, *again;
+    NearmissMeshAbout about;
+    OK(nearmiss_mesh_from_triangles(corners, 8, faces, 12, 0.0, &cube));
+    OK(nearmiss_mesh_about(cube, &about));
+    CHECK(about.triangles == 12 && about.vertices == 8 && about.welded == 0 && about.degenerate == 0);
+    CHECK(fabs(about.max[2] - 0.1) < 1e-9 && about.min[0] == 0.0);
+    size_t length;
+    OK(nearmiss_mesh_to_bytes(cube, NULL, 0, &length));
+    uint8_t *bytes = malloc(length);
+    OK(nearmiss_mesh_to_bytes(cube, bytes, length, &length));
+    OK(nearmiss_mesh_from_bytes(bytes, length, NEARMISS_CHECKS_FULL, &again));
+    free(bytes);
+
+    NearmissWorld *world;
+    NearmissPlan *any;
+    uint64_t floor, first, second, ball;
+    NearmissPlaced low = at(0, 0, 0);
+    const double centre[3] = {0, 0, 0};
+    NearmissShape sphere = nearmiss_sphere(&centre, 0.05);
+    OK(nearmiss_world_new(&world));
+    OK(nearmiss_plan_new(NULL, NULL, NULL, &any));
+    NearmissPose pose = at(0.3, 0.3, 0.2).pose;
+    OK(nearmiss_world_insert_mesh(world, cube, &pose, &first));
+    pose = at(0.35, 0.3, 0.25).pose;
+    OK(nearmiss_world_insert_mesh(world, again, &pose, &second));
+    OK(nearmiss_world_insert_shape(world, &sphere, NULL, &ball));
+    OK(nearmiss_mesh_free(cube));
+    OK(nearmiss_mesh_free(again));
+    pose = at(0.35, 0.35, 0.5).pose;
+    OK(nearmiss_world_move(world, ball, &pose));
+    NearmissAnswer answer;
+    NearmissBodyDistance found;
+    OK(nearmiss_world_collide(world, any, (NearmissBodyPair){first, second}, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && answer.evidence == NEARMISS_EVIDENCE_CERTIFIED);
+    CHECK(answer.witness[2] > 0.25 - 1e-6 && answer.witness[2] < 0.3 + 1e-6);
+    pose = at(0.3, 0.3, 0.6).pose;
+    OK(nearmiss_world_move(world, second, &pose));
+    OK(nearmiss_world_collide(world, any, (NearmissBodyPair){first, second}, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED);
+    OK(nearmiss_world_distance(world, any, (NearmissBodyPair){first, ball}, NULL, scratch, &found));
+    CHECK(found.lower > 0.149 && fabs(found.upper - 0.15) < 1e-6);
+    OK(nearmiss_world_nearest_pair(world, any, INFINITY, NULL, 0, scratch, &found));
+    CHECK(found.pair.a == second && found.pair.b == ball && fabs(found.upper - 0.05) < 1e-6);
+
+    OK(nearmiss_world_insert(world, &low, &floor));
+    OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){floor, first}, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED && answer.evidence == NEARMISS_EVIDENCE_CERTIFIED);
+    OK(nearmiss_world_distance(world, plan, (NearmissBodyPair){floor, first}, NULL, scratch, &found));
+    CHECK(found.lower <= 0.2 && found.lower > 0.17 && fabs(found.upper - 0.2) < 1e-6);
+    CHECK(fabs(found.point_a[2]) < 1e-6 && fabs(found.point_b[2] - 0.2) < 1e-6);
+    pose = at(0.3, 0.3, -0.05).pose;
+    OK(nearmiss_world_move(world, first, &pose));
+    OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){first, floor}, NULL, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && fabs(answer.witness[2]) < 0.02);
+
+    NearmissMesh *refused;
+    faces[4] = 8;
+    FAILS(nearmiss_mesh_from_triangles(corners, 8, faces, 12, 0.0, &refused), NEARMISS_STATUS_ARGUMENT, "vertex");
+    CHECK(refused == NULL);
+    faces[4] = 2, corners[5] = NAN;
+    FAILS(nearmiss_mesh_from_triangles(corners, 8, faces, 12, 0.0, &refused), NEARMISS_STATUS_ARGUMENT, "finite");
+    FAILS(nearmiss_mesh_from_triangles(corners, 8, NULL, 12, 0.0, &refused), NEARMISS_STATUS_NULL, "triangles");
+    FAILS(nearmiss_mesh_read("missing.obj", 0.0, &refused), NEARMISS_STATUS_IO, "missing.obj");
+    FAILS(nearmiss_mesh_open("missing.nm", 0, &refused), NEARMISS_STATUS_IO, "missing.nm");
+    FAILS(nearmiss_mesh_free((NearmissMesh *)plate), NEARMISS_STATUS_HANDLE, "NearmissMesh");
+    FAILS(nearmiss_world_insert_mesh(world, NULL, NULL, &first), NEARMISS_STATUS_NULL, "mesh");
+    OK(nearmiss_plan_free(any));
+    OK(nearmiss_world_free(world));
+}
+
 static void maps(void) {
     enum { SIDE = 60, COUNT = SIDE * SIDE + 4 * SIDE * 40 };
     double *points = malloc(3 * COUNT * sizeof *points), *p = points;
@@ -333,6 +411,7 @@ int main(void) {
     motions();
     worlds();
     worlds_of_shapes();
+    worlds_of_meshes();
     maps();
     messages();
     OK(nearmiss_scratch_free(scratch));

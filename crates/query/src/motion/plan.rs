@@ -60,13 +60,25 @@ impl SweepPlan {
     /// Returns [`PlanError::Margin`] for a negative or non-finite clearance, and the errors of
     /// [`DistancePlan::new`].
     pub fn new(options: &SweepOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
+        Self::of_metrics(options, [a.metric(), b.metric()])
+    }
+
+    /// Validates `options` for any scans of a metric, such as those that a [world](crate::World) will have.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_metric(options: &SweepOptions, metric: Metric) -> Result<Self, PlanError> {
+        Self::of_metrics(options, [metric; 2])
+    }
+
+    fn of_metrics(options: &SweepOptions, metrics: [Metric; 2]) -> Result<Self, PlanError> {
         let distance = DistanceOptions { metric: options.metric, ..DistanceOptions::default() }
             .with_semantics(options.semantics);
-        let distance = DistancePlan::new(&distance, a, b)?;
+        let distance = DistancePlan::of_metrics(&distance, metrics)?;
         let touching = CollideOptions { metric: options.metric, ..CollideOptions::default() }
             .with_semantics(options.semantics)
             .with_margin(options.clearance);
-        let touching = CollidePlan::new(&touching, a, b)?;
+        let touching = CollidePlan::of_metrics(&touching, metrics)?;
         let options = SweepOptions { metric: distance.options().metric, ..*options };
         Ok(Self { options, distance, touching })
     }

@@ -27,6 +27,14 @@ impl ShapePlan {
     /// Names the option that is out of range, or the metric that does not match. The methods of the
     /// papers, and sphere coverings, are for two scans: either is [`PlanError::NotForShapes`].
     pub fn new(options: &CollideOptions, scan: &PointHierarchy) -> Result<Self, PlanError> {
+        Self::of_metric(options, scan.metric())
+    }
+
+    /// Validates `options` for any scans of a metric, such as those that a [world](crate::World) will have.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_metric(options: &CollideOptions, metric: Metric) -> Result<Self, PlanError> {
         let refused = match options.method {
             Method::Sampling(_) => Some("the method `sampling`"),
             Method::Interpolation(_) => Some("the method `interpolation`"),
@@ -35,7 +43,7 @@ impl ShapePlan {
         if let Some(what) = refused {
             return Err(PlanError::NotForShapes(what));
         }
-        Ok(Self { options: *CollidePlan::new(options, scan, scan)?.options() })
+        Ok(Self { options: *CollidePlan::of_metric(options, metric)?.options() })
     }
 
     /// The plan for one scan of a pair, with the options of the pair. Nothing evaluates the implicit
