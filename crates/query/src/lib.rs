@@ -36,6 +36,7 @@ pub use leaf::crossing::{Disc, crossing};
 pub use many::batch::{BatchScratch, Until, each};
 pub use many::body::{Body, BodyDistance, BodyPair, PlacedBody};
 pub use many::nearest::NearestPair;
+pub use many::penetration::BodyInterior;
 pub use many::touch::{BodyAnswer, BodyVerdict};
 pub use many::world::{Bodies, BodyId, World};
 pub use mesh::answer::{ContactRegion, MeshAnswer, MeshContact, MeshVerdict};

@@ -4,5 +4,6 @@ pub(crate) mod batch;
 pub(crate) mod body;
 pub(crate) mod bounds;
 pub(crate) mod nearest;
+pub(crate) mod penetration;
 pub(crate) mod touch;
 pub(crate) mod world;

@@ -320,6 +320,12 @@ impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
         self.bodies.keys().copied()
     }
 
+    /// Returns a body without its pose, or `None` if no body has this id.
+    #[must_use]
+    pub fn get(&self, id: BodyId) -> Option<&Body<S, M, H>> {
+        self.bodies.get(&id).map(|entry| &entry.body)
+    }
+
     /// Returns a placed body, or `None` if no body has this id.
     #[must_use]
     pub fn body(&self, id: BodyId) -> Option<PlacedBody<'_>> {

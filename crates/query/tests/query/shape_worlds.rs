@@ -6,9 +6,9 @@ use std::sync::Arc;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, MeshHierarchy, PointHierarchy};
 use nearmiss_query::{
-    AsShape, Bodies, Body, BodyId, BodyPair, BodyVerdict, CollideOptions, CollidePlan, DistanceOptions,
-    DistancePlan, PlacedBody, PlacedShape, Prepared, PreparedMesh, Reason, Scratch, Shape, ShapePlan,
-    ShapeScanPair, ShapeVerdict, World,
+    AsShape, Bodies, Body, BodyId, BodyInterior, BodyPair, BodyVerdict, Budget, CollideOptions, CollidePlan,
+    DistanceOptions, DistancePlan, Interior, MeshSolid, PlacedBody, PlacedShape, Prepared, PreparedMesh,
+    Reason, Scratch, Shape, ShapePlan, ShapeScanPair, ShapeVerdict, World,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use rand::RngExt;
@@ -325,5 +325,76 @@ fn touches_of_all_kinds_agree_with_their_distances() {
                 assert!(is_refused && found.band == f64::INFINITY, "{found:?} {pair:?}");
             }
         }
+    }
+}
+
+#[test]
+fn bodies_of_all_kinds_are_apart_after_the_shift_that_penetration_tells() {
+    let rng = &mut rng(6106);
+    let mesh = prepared(&cube(4));
+    let solid = MeshSolid::new(&mesh);
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &SCANS[0], &SCANS[1]).unwrap();
+    let scratch = &mut Scratch::default();
+    let budget = Budget::UNLIMITED;
+    let interior = |body: &Body<usize, (), Owned>| match body {
+        Body::Scan(_) => BodyInterior::Scan(Interior::Hollow),
+        Body::Mesh(()) => BodyInterior::Mesh(&solid),
+        Body::Shape(_) => BodyInterior::Shape,
+    };
+    let mut moved = [0; 6];
+    for _ in 0..3 {
+        let (mut world, known) = crowd(&mesh, 26, 1.5, rng);
+        for (j, b) in known.iter().enumerate() {
+            for a in &known[..j] {
+                let (interiors, ids) = ([interior(&a.1), interior(&b.1)], [a.0, b.0]);
+                let pair = world.body_pair(ids).unwrap();
+                let kind = match &pair {
+                    BodyPair::Scans(_) => 0,
+                    BodyPair::MeshAndScan { .. } => 1,
+                    BodyPair::Meshes(_) => 2,
+                    BodyPair::ShapeAndScan { .. } => 3,
+                    BodyPair::ShapeAndMesh { .. } => 4,
+                    BodyPair::Shapes(_) => 5,
+                };
+                if moved[kind] > 20 {
+                    continue;
+                }
+                let found = pair.penetration(&plan, interiors, &budget, scratch);
+                let context = format!("{found:?}, {a:?}, {b:?}");
+                if pair.touch(&plan, scratch).verdict.is_separated() && matches!(kind, 0 | 3 | 5) {
+                    assert_eq!(found.upper, 0.0, "{context}");
+                }
+                let turned = world.body_pair([b.0, a.0]).unwrap();
+                let back = turned.penetration(&plan, [interiors[1], interiors[0]], &budget, scratch);
+                if matches!(kind, 1 | 3 | 4) {
+                    assert_eq!((back.lower, back.upper), (found.lower, found.upper), "{context}");
+                    assert!((0..3).all(|k| back.direction[k] == -found.direction[k]), "{context}, {back:?}");
+                }
+                if found.upper == 0.0 {
+                    continue;
+                }
+                moved[kind] += 1;
+                assert!(found.upper.is_finite() && found.lower <= found.upper, "{context}");
+                let by = found.upper * (1.0 + 1e-9) + 1e-9;
+                let shift = Pose::from_translation(found.direction.map(|c| c * by));
+                assert!(world.move_to(b.0, &shift.after(&b.2)), "it exists");
+                let after = world.body_pair(ids).unwrap();
+                assert!(after.touch(&plan, scratch).verdict.is_separated(), "after the shift, {context}");
+                assert!(world.move_to(b.0, &b.2), "it exists");
+            }
+        }
+    }
+    assert!(moved.iter().all(|&count| count >= 2), "all kinds: {moved:?}");
+
+    // Interiors of other kinds, and of another mesh.
+    let (other, ball) = (prepared(&cube(3)), Shape::Sphere { centre: [0.0; 3], radius: 1.0 });
+    let other = MeshSolid::new(&other);
+    let at = Pose::IDENTITY;
+    let pair = BodyPair::new(PlacedBody::Shape(ball.at(&at)), PlacedBody::Mesh(mesh.at(&at)));
+    for (mesh, shape) in
+        [(BodyInterior::Mesh(&other), BodyInterior::Shape), (BodyInterior::Shape, BodyInterior::Mesh(&solid))]
+    {
+        let found = pair.penetration(&plan, [shape, mesh], &budget, scratch);
+        assert!(found.upper == f64::INFINITY && found.lower == 0.0, "{found:?}");
     }
 }
