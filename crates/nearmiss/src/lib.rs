@@ -66,10 +66,10 @@ pub use nearmiss_hierarchy::{
     ScanPoints,
 };
 pub use nearmiss_query::{
-    Answer, AsShape, BatchScratch, Bodies, Body, BodyAnswer, BodyDistance, BodyId, BodyPair, BodyVerdict,
-    Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions, CollidePlan,
-    Contact, ContactGroup, ContactRegion, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan, Curves,
-    Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence, Interior, Interpolation,
+    Answer, AsShape, BatchScratch, Bodies, Body, BodyAnswer, BodyDistance, BodyId, BodyInterior, BodyPair,
+    BodyVerdict, Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions,
+    CollidePlan, Contact, ContactGroup, ContactRegion, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan,
+    Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence, Interior, Interpolation,
     ManifoldPoint, MeshAnswer, MeshContact, MeshDistance, MeshHint, MeshItself, MeshPair, MeshQuality,
     MeshScanHint, MeshScanPair, MeshScanPlan, MeshScanSweep, MeshScratch, MeshSolid, MeshVerdict, Method,
     Moving, NearestPair, NearestPoint, Order, Pacer, Pair, PairHint, Penetration, Placed, PlacedBody,

@@ -51,7 +51,7 @@ pub struct Penetration {
 }
 
 impl Penetration {
-    fn new(found: &nearmiss::Penetration) -> Self {
+    pub(crate) fn new(found: &nearmiss::Penetration) -> Self {
         let &nearmiss::Penetration { lower, upper, direction, evidence: certainty, band, complete, .. } =
             found;
         Self { lower, upper, direction, band, evidence: evidence(certainty), complete }
@@ -59,7 +59,7 @@ impl Penetration {
 }
 
 /// Returns what counts of the insides of two scans, from a `NearmissSolids` of at most `last`.
-fn interiors(solids: i32, last: Solids) -> Result<[Interior; 2], Failure> {
+pub(crate) fn interiors(solids: i32, last: Solids) -> Result<[Interior; 2], Failure> {
     if !(0..=last as i32).contains(&solids) {
         let last = last as i32;
         return Err(Failure::argument(format_args!("expected solids of 0 to {last}, got {solids}")));

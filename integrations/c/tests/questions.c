@@ -268,7 +268,7 @@ static void worlds_of_meshes(void) {
     NearmissMeshAbout about;
     OK(nearmiss_mesh_from_triangles(corners, 8, faces, 12, 0.0, &cube));
     OK(nearmiss_mesh_about(cube, &about));
-    CHECK(about.triangles == 12 && about.vertices == 8 && about.welded == 0 && about.degenerate == 0);
+    CHECK(about.triangles == 12 && about.vertices == 8 && about.welded == 0 && about.is_closed);
     CHECK(fabs(about.max[2] - 0.1) < 1e-9 && about.min[0] == 0.0);
     size_t length;
     OK(nearmiss_mesh_to_bytes(cube, NULL, 0, &length));
@@ -318,6 +318,23 @@ static void worlds_of_meshes(void) {
     OK(nearmiss_world_move(world, first, &pose));
     OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){first, floor}, NULL, NULL, scratch, &answer));
     CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && fabs(answer.witness[2]) < 0.02);
+
+    NearmissPenetration out;
+    NearmissBodyPair pressed = {floor, first};
+    OK(nearmiss_world_penetration(world, plan, pressed, NEARMISS_SOLIDS_NONE, NULL, scratch, &out));
+    CHECK(fabs(out.upper - 0.05) < 2e-3 && out.direction[2] > 0.99 && out.lower > 0.02 && out.lower <= 0.05);
+    pressed = (NearmissBodyPair){first, floor};
+    OK(nearmiss_world_penetration(world, plan, pressed, NEARMISS_SOLIDS_NONE, NULL, scratch, &out));
+    CHECK(fabs(out.upper - 0.05) < 2e-3 && out.direction[2] < -0.99);
+    pose = at(0.3, 0.3, 0.52).pose;
+    OK(nearmiss_world_move(world, second, &pose));
+    OK(nearmiss_world_penetration(world, any, (NearmissBodyPair){second, ball}, 0, NULL, scratch, &out));
+    CHECK(out.lower > 0.029 && fabs(out.upper - 0.03) < 1e-5 && out.direction[2] < -0.99 && out.band == 0.0);
+    OK(nearmiss_world_penetration(world, any, (NearmissBodyPair){second, first}, 0, NULL, scratch, &out));
+    CHECK(out.upper == 0.0);
+    FAILS(nearmiss_world_penetration(world, any, (NearmissBodyPair){second, 99}, 0, NULL, scratch, &out),
+          NEARMISS_STATUS_ARGUMENT, "got 99");
+    FAILS(nearmiss_world_penetration(world, any, pressed, 4, NULL, scratch, &out), NEARMISS_STATUS_ARGUMENT, "got 4");
 
     NearmissMesh *refused;
     faces[4] = 8;

@@ -117,8 +117,9 @@ impl Rest {
         }
     }
 
-    /// Fits the motion from `points`, at rest, to the places `now`. For a leaf that is carried along, the spacing changes by at most the factor `most` or its reciprocal, and
-    /// so does the ratio of a length to the spacing. Each point is within `off` of its radius of its place.
+    /// Fits the motion from `points`, at rest, to the places `now`. For a leaf that is carried along, the
+    /// spacing changes by at most the factor `most` or its reciprocal, and so does the ratio of a length to
+    /// the spacing. Each point is within `off` of its radius of its place.
     #[inline(always)]
     pub(crate) fn motion<S: Simd>(
         &self,

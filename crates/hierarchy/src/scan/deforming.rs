@@ -116,11 +116,11 @@ impl DeformingScan {
     /// allocate once warm if no point is fitted anew.
     ///
     /// The points of a leaf are carried along by the affine map that fits their motion since they were last
-    /// fitted: normals turn with it, radii scale with the spacing, classes stay. Where the spacing, or a length
-    /// relative to it, changed by more than a quarter, or the motion is not affine, the points of the leaf are
-    /// fitted anew. Boxes, enclosures and leaf records are computed from the result. Neighbour lists are
-    /// dropped, so that evaluations of f descend instead. The reach and the order of the points stay, and
-    /// sphere coverings are infinite until [`Self::renew`].
+    /// fitted: normals turn with it, radii scale with the spacing, classes stay. Where the spacing, or a
+    /// length relative to it, changed by more than a quarter, or the motion is not affine, the points of the
+    /// leaf are fitted anew. Boxes, enclosures and leaf records are computed from the result. Neighbour
+    /// lists are dropped, so that evaluations of f descend instead. The reach and the order of the points
+    /// stay, and sphere coverings are infinite until [`Self::renew`].
     ///
     /// # Errors
     /// If the number of points differs from that of the first frame, a coordinate is not finite or

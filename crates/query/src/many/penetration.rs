@@ -12,7 +12,7 @@ use crate::solid::plan::ShapePlan;
 /// The inside of a body of a world.
 #[derive(Debug, Clone, Copy)]
 pub enum BodyInterior<'a> {
-    /// That of a scan.
+    /// The inside of a scan.
     Scan(Interior),
     /// The closed parts of a mesh.
     Mesh(&'a MeshSolid),
@@ -26,7 +26,9 @@ impl BodyPair<'_> {
     ///
     /// `plan` is that of [`Self::touch`]. `interiors` are those of the first and of the second body; if one
     /// is that of another kind, or of another mesh, the upper bound is infinite. `budget` counts for all
-    /// kinds but two shapes, instead of that of the pair. See [`Pair::penetration`](crate::Pair::penetration),
+    /// kinds but two shapes, instead of that of the pair.
+    ///
+    /// See [`Pair::penetration`](crate::Pair::penetration),
     /// [`MeshScanPair::penetration`](crate::MeshScanPair::penetration),
     /// [`MeshPair::penetration`](crate::MeshPair::penetration),
     /// [`ShapeScanPair::penetration`](crate::ShapeScanPair::penetration),
