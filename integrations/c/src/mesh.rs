@@ -2,11 +2,10 @@
 
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
-use std::sync::{Arc, OnceLock};
 
+use nearmiss::MeshBuildOptions;
 use nearmiss::geometry::TriangleMesh;
 use nearmiss::mesh::CleanOptions;
-use nearmiss::{MeshBuildOptions, MeshSolid, PlacedMesh, PreparedMesh};
 
 use crate::file::{check, unloadable, unreadable, unwritable};
 use crate::handle::{Handle, free, get, make, opaque};
@@ -16,34 +15,9 @@ use crate::status::{Failure, Status, guard};
 /// A prepared triangle mesh, for worlds (`nearmiss_world_insert_mesh`). Any number of threads may use one at
 /// the same time.
 #[derive(Debug)]
-pub struct Mesh(Handle<OwnMesh>);
+pub struct Mesh(Handle<nearmiss::Mesh>);
 
-opaque!(Mesh of OwnMesh as b"nm-mesh.");
-
-/// A mesh, and its closed parts once somebody asked for them.
-#[derive(Debug, Clone)]
-pub(crate) struct OwnMesh {
-    mesh: nearmiss::Mesh,
-    solid: Arc<OnceLock<MeshSolid>>,
-}
-
-impl OwnMesh {
-    fn new(mesh: nearmiss::Mesh) -> Self {
-        Self { mesh, solid: Arc::default() }
-    }
-
-    /// Returns the closed parts.
-    pub(crate) fn solid(&self) -> &MeshSolid {
-        self.solid.get_or_init(|| MeshSolid::new(&self.mesh))
-    }
-}
-
-impl PreparedMesh for OwnMesh {
-    #[inline]
-    fn at(&self, pose: &nearmiss::Pose) -> PlacedMesh<'_> {
-        self.mesh.at(pose)
-    }
-}
+opaque!(Mesh of nearmiss::Mesh as b"nm-mesh.");
 
 /// Facts about a mesh. Lengths are in the units of its input.
 #[derive(Debug, Clone, Copy)]
@@ -67,9 +41,9 @@ pub struct MeshAbout {
     pub welded: u64,
 }
 
-fn prepare(mesh: &TriangleMesh, weld: f64) -> Result<OwnMesh, Failure> {
+fn prepare(mesh: &TriangleMesh, weld: f64) -> Result<nearmiss::Mesh, Failure> {
     let options = MeshBuildOptions::default().with_clean(CleanOptions::default().with_weld(weld));
-    nearmiss::Mesh::build(mesh, &options).map(OwnMesh::new).map_err(Failure::argument)
+    nearmiss::Mesh::build(mesh, &options).map_err(Failure::argument)
 }
 
 /// Prepares `triangle_count` triangles, three indices of vertices each, over `vertex_count` vertices, three
@@ -133,7 +107,7 @@ pub unsafe extern "C" fn nearmiss_mesh_open(
     guard(|| {
         make(out, || {
             // SAFETY: the caller promises the text.
-            nearmiss::Mesh::open(unsafe { path(file) }?, check(checks)?).map(OwnMesh::new).map_err(unloadable)
+            nearmiss::Mesh::open(unsafe { path(file) }?, check(checks)?).map_err(unloadable)
         })
     })
 }
@@ -154,7 +128,7 @@ pub unsafe extern "C" fn nearmiss_mesh_from_bytes(
         make(out, || {
             // SAFETY: the caller promises the bytes.
             let bytes = unsafe { slice(bytes, length, "bytes") }?.to_vec();
-            nearmiss::Mesh::from_bytes(bytes, check(checks)?).map(OwnMesh::new).map_err(unloadable)
+            nearmiss::Mesh::from_bytes(bytes, check(checks)?).map_err(unloadable)
         })
     })
 }
@@ -167,7 +141,7 @@ pub unsafe extern "C" fn nearmiss_mesh_from_bytes(
 pub unsafe extern "C" fn nearmiss_mesh_save(mesh: Option<&Mesh>, file: *const c_char) -> Status {
     guard(|| {
         // SAFETY: the caller promises the text.
-        get(mesh, "mesh")?.mesh.save(unsafe { path(file) }?).map(drop).map_err(unwritable)
+        get(mesh, "mesh")?.save(unsafe { path(file) }?).map(drop).map_err(unwritable)
     })
 }
 
@@ -185,7 +159,7 @@ pub unsafe extern "C" fn nearmiss_mesh_to_bytes(
 ) -> Status {
     guard(|| {
         let mut bytes = Vec::new();
-        get(mesh, "mesh")?.mesh.write_to(&mut bytes).map_err(unwritable)?;
+        get(mesh, "mesh")?.write_to(&mut bytes).map_err(unwritable)?;
         // SAFETY: the caller promises the buffer.
         unsafe { fill(bytes.into_iter(), (buffer, capacity), length) }
     })
@@ -198,15 +172,14 @@ pub extern "C" fn nearmiss_mesh_about(
     out: Option<&mut MaybeUninit<MeshAbout>>,
 ) -> Status {
     guard(|| {
-        let own = get(mesh, "mesh")?;
-        let mesh = &own.mesh;
+        let mesh = get(mesh, "mesh")?;
         let (bounds, dropped) = (mesh.bounds(), mesh.dropped());
         let about = MeshAbout {
             triangles: mesh.len() as u64,
             vertices: mesh.vertices() as u64,
             min: bounds.min,
             max: bounds.max,
-            is_closed: own.solid().is_closed(),
+            is_closed: mesh.solid().is_closed(),
             degenerate: dropped.degenerate.into(),
             duplicate: dropped.duplicate.into(),
             welded: dropped.welded_vertices.into(),

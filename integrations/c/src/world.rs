@@ -7,7 +7,7 @@ use nearmiss::{Bodies, Body, BodyId, BodyInterior};
 use crate::answer::{Answer, NOWHERE};
 use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::hint::Hint;
-use crate::mesh::{Mesh, OwnMesh};
+use crate::mesh::Mesh;
 use crate::options::{Budget, budget};
 use crate::penetration::{Penetration, Solids, interiors};
 use crate::plan::Plan;
@@ -20,7 +20,7 @@ use crate::status::{Failure, Status, guard};
 /// The bodies of a world.
 ///
 /// cbindgen:ignore
-type Crowd = nearmiss::World<nearmiss::Scan, OwnMesh, OwnShape>;
+type Crowd = nearmiss::World<nearmiss::Scan, nearmiss::Mesh, OwnShape>;
 
 /// Placed scans, meshes and convex shapes, each a body with an id. Any number of threads may ask at the same
 /// time, while none changes it.

@@ -1,7 +1,6 @@
 //! Methods of `Mesh`: a prepared triangle mesh and the questions about it.
 
 use std::path::PathBuf;
-use std::sync::OnceLock;
 
 use nearmiss::geometry::TriangleMesh;
 use nearmiss::mesh::CleanOptions;
@@ -24,7 +23,7 @@ use crate::things::{Mesh, Side, Thing};
 
 impl Mesh {
     fn new_of(mesh: Prepared) -> Self {
-        Self { mesh, solid: OnceLock::new() }
+        Self { mesh }
     }
 
     fn build(py: Python<'_>, mesh: TriangleMesh, weld: f64) -> PyResult<Self> {
@@ -117,7 +116,7 @@ impl Mesh {
     /// True if a part of the mesh is closed, and counts as solid in `penetration`.
     #[getter]
     fn is_closed(&self) -> bool {
-        self.solid().is_closed()
+        self.mesh.solid().is_closed()
     }
 
     /// Decide whether this mesh, at `own_pose`, touches `other`, at `pose`: a Mesh or any scan.

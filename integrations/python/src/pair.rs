@@ -237,26 +237,10 @@ impl<'a> Overlap<'a> {
             Side::Mesh(mesh) => Some(*mesh),
             Side::Scan(_) => None,
         });
-        let are_solid = match solid {
-            None => [false, false],
-            Some("a") => [true, false],
-            Some("b") => [false, true],
-            Some("both") => [true, true],
-            Some(name) => {
-                return Err(refused(format!(
-                    "expected `solid` to be \"a\", \"b\" or \"both\", got {name:?}"
-                )));
-            }
-        };
-        if let Some(name) = solid.filter(|_| (0..2).any(|k| are_solid[k] && meshes[k].is_some())) {
-            return Err(refused(format!(
-                "expected `solid` to name scans, got {name:?} with a mesh; its closed parts are solid anyway"
-            )));
-        }
+        let interiors = interiors(solid, meshes.map(|mesh| mesh.is_none()))?;
         let asked = &options.collide;
         let scans = |a: &_, b: &_| CollidePlan::new(asked, a, b);
         let pair = Planned::new(sides, scans, |scan| MeshScanPlan::new(asked, scan))?;
-        let interiors = are_solid.map(|is| if is { Interior::Solid } else { Interior::Hollow });
         Ok(Self { pair, interiors, meshes, options })
     }
 
@@ -276,10 +260,10 @@ impl<'a> Overlap<'a> {
             (Planned::Meshes(meshes), [Some(a), Some(b)]) => Some(
                 mesh_pair_of(meshes, &poses)
                     .within(&budget)
-                    .penetration([a.solid(), b.solid()], scratch.meshes()),
+                    .penetration([a.mesh.solid(), b.mesh.solid()], scratch.meshes()),
             ),
             (Planned::Mixed(mixed, plan), [Some(mesh), _] | [_, Some(mesh)]) => {
-                let inside = (self.interiors[usize::from(mixed.is_swapped)], mesh.solid());
+                let inside = (self.interiors[usize::from(mixed.is_swapped)], mesh.mesh.solid());
                 let mut found = mixed.pair(&poses).within(&budget).penetration(plan, inside, scratch);
                 if mixed.is_swapped {
                     // The mesh moves out of the scan.
@@ -292,6 +276,27 @@ impl<'a> Overlap<'a> {
         let Some(found) = found else { return Err(refused("expected the closed parts of a mesh")) };
         Ok((found.lower, found.upper, found.direction))
     }
+}
+
+/// Returns the insides of two things, given which of them are scans. `solid` names scans whose surface
+/// encloses a solid.
+pub(crate) fn interiors(solid: Option<&str>, are_scans: [bool; 2]) -> PyResult<[Interior; 2]> {
+    let are_solid = match solid {
+        None => [false, false],
+        Some("a") => [true, false],
+        Some("b") => [false, true],
+        Some("both") => [true, true],
+        Some(name) => {
+            return Err(refused(format!("expected `solid` to be \"a\", \"b\" or \"both\", got {name:?}")));
+        }
+    };
+    if let Some(name) = solid.filter(|_| (0..2).any(|k| are_solid[k] && !are_scans[k])) {
+        return Err(refused(format!(
+            "expected `solid` to name scans, got {name:?} with another thing; shapes and the closed parts of a mesh \
+             are solid anyway"
+        )));
+    }
+    Ok(are_solid.map(|is| if is { Interior::Solid } else { Interior::Hollow }))
 }
 
 /// Returns the pair of two scans at these poses.

@@ -1,8 +1,6 @@
 //! The things that questions are about, as classes of Python.
 
-use std::sync::OnceLock;
-
-use nearmiss::{Mesh as PreparedMesh, MeshSolid};
+use nearmiss::Mesh as PreparedMesh;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -23,8 +21,6 @@ pub(crate) struct AnyScan(pub(crate) Source);
 #[derive(Debug)]
 pub(crate) struct Mesh {
     pub(crate) mesh: PreparedMesh,
-    /// The closed parts, once they were asked for.
-    pub(crate) solid: OnceLock<MeshSolid>,
 }
 
 /// A thing to compare with.
@@ -57,13 +53,6 @@ impl Thing<'_> {
             Self::Scan(scan) => Side::Scan(scan.get().0.frame(scan.py())),
             Self::Mesh(mesh) => Side::Mesh(mesh.get()),
         }
-    }
-}
-
-impl Mesh {
-    /// Returns the closed parts, found when first asked for.
-    pub(crate) fn solid(&self) -> &MeshSolid {
-        self.solid.get_or_init(|| MeshSolid::new(&self.mesh))
     }
 }
 

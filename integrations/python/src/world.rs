@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex};
 
 use nearmiss::{
-    AsShape, Bodies, BodyId, BodyPair, CollidePlan, DistanceOptions, DistancePlan, Mesh as PreparedMesh,
-    MeshScanPlan, Metric, PlacedBody, Pose, Scan as PreparedScan, Scratch, Shape as Convex, ShapePlan,
-    World as Crowd,
+    AsShape, Bodies, Body, BodyId, BodyInterior, BodyPair, CollidePlan, DistanceOptions, DistancePlan,
+    Interior, Mesh as PreparedMesh, MeshScanPlan, Metric, PlacedBody, Pose, Scan as PreparedScan, Scratch,
+    Shape as Convex, ShapePlan, World as Crowd,
 };
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
@@ -15,6 +15,7 @@ use crate::answers::{AnswerRecord, Distance, DistanceRecord, PairRecord as _};
 use crate::cloud::rows;
 use crate::failure::refused;
 use crate::options::{OF_DISTANCE, OF_NEAREST, OF_SCANS, Options};
+use crate::pair::interiors;
 use crate::pool::{ask, ask_each};
 use crate::poses::Poses;
 use crate::record::array;
@@ -241,6 +242,37 @@ impl World {
         Ok(Distance(ask(py, |scratch| distance(&pair, &plan, scratch))))
     }
 
+    /// Bound the length of the shortest move that takes the body `b` out of the body `a`. `solid` names
+    /// scans whose surface encloses a solid: "a", "b" or "both". Shapes and the closed parts of meshes are
+    /// solid anyway.
+    ///
+    /// Returns (lower, upper, direction), as `Scan.penetration` does. Options are those of `Scan.collide`.
+    /// Raises `KeyError` for an unknown id.
+    #[pyo3(signature = (a, b, *, solid = None, **options))]
+    fn penetration(
+        &self,
+        py: Python<'_>,
+        a: u64,
+        b: u64,
+        solid: Option<&str>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<(f64, f64, [f64; 3])> {
+        let world = self.copy();
+        let metric = metric_of(&world)?;
+        let options = Options::new(options, OF_SCANS, metric)?;
+        let plan = CollidePlan::of_metric(&options.collide, metric).map_err(refused)?;
+        let [first, second] = [a, b].map(|id| world.get(BodyId(id)).ok_or_else(|| no_body(id)));
+        let bodies = [first?, second?];
+        let [own, other] = interiors(solid, bodies.map(|body| matches!(body, Body::Scan(_))))?;
+        let pair = world.body_pair([BodyId(a), BodyId(b)]).ok_or_else(|| no_body(a))?;
+        let found = ask(py, |scratch| {
+            // The closed parts of meshes are found when first asked for, without the interpreter.
+            let interiors = [interior(bodies[0], own), interior(bodies[1], other)];
+            pair.penetration(&plan, interiors, &options.budget(), scratch)
+        });
+        Ok((found.lower, found.upper, found.direction))
+    }
+
     /// Find the two bodies that are nearest to each other, of those whose bounding boxes come within the
     /// length `reach`. Pairs of ids in `ignore` do not count, such as neighbouring links of a robot.
     ///
@@ -269,6 +301,15 @@ impl World {
             let record = DistanceRecord::of_bodies((found.lower, found.upper), found.points);
             (found.ids.map(|id| id.0), Distance(record))
         }))
+    }
+}
+
+/// Returns the inside of a body; that of a scan is given.
+fn interior(body: &Body<PreparedScan, PreparedMesh, Arc<Shape>>, of_scan: Interior) -> BodyInterior<'_> {
+    match body {
+        Body::Scan(_) => BodyInterior::Scan(of_scan),
+        Body::Mesh(mesh) => BodyInterior::Mesh(mesh.solid()),
+        Body::Shape(_) => BodyInterior::Shape,
     }
 }
 

@@ -196,9 +196,21 @@ class Motions(unittest.TestCase):
         self.assertEqual((hasty.complete, hasty.upper >= hasty.lower), (tip.distance(floor, work=1).complete, True))
         with self.assertRaisesRegex(TypeError, "`seconds`"):
             world.nearest(seconds=1)
+        for a, b, depth, up in ((ground, mesh, 0.1, 1), (mesh, ground, 0.1, -1), (low, high, 0.01, 1)):
+            lower, upper, direction = world.penetration(a, b)
+            self.assertTrue(lower <= depth + 1e-6 and abs(upper - depth) < 2e-3, (a, b, lower, upper))
+            self.assertGreater(up * direction[2], 0.99)
+        self.assertEqual(world.penetration(ground, high)[:2], (0.0, 0.0))
+        lower, upper, direction = world.penetration(ground, low)
+        self.assertTrue(lower <= 0.01 + 1e-6 and abs(upper - 0.01) < 2e-3 and direction[2] > 0.99)
+        self.assertGreater(world.penetration(ground, low, solid="a")[1], 0.0)
+        with self.assertRaisesRegex(ValueError, "to name scans, got 'b'|to name scans, got \"b\""):
+            world.penetration(ground, low, solid="b")
         for a, b in ((ground, 99), (99, ground)):
             with self.assertRaises(KeyError):
                 world.distance(a, b)
+            with self.assertRaises(KeyError):
+                world.penetration(a, b)
         with self.assertRaisesRegex(TypeError, "a Scan, a Mesh or a Shape"):
             world.insert(np.eye(3))
         world.move_to(low, at(0.2, 0.2, 0.5))

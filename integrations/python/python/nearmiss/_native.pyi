@@ -458,6 +458,14 @@ class World:
         self, of: Sequence[int] | None = None, **options: Unpack[_CollideOptions]
     ) -> tuple[NDArray[np.uint64], _Records]: ...
     def distance(self, a: int, b: int, **options: Unpack[_DistanceOptions]) -> Distance: ...
+    def penetration(
+        self,
+        a: int,
+        b: int,
+        *,
+        solid: str | None = None,
+        **options: Unpack[_CollideOptions],
+    ) -> tuple[float, float, _Triple]: ...
     def nearest(
         self,
         reach: SupportsFloat = ...,
