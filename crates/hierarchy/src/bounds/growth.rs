@@ -21,7 +21,6 @@ pub struct Growth {
 
 /// Returns the upper half of a length, rounded up; [`BOUNDLESS`] for NaN.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "a half")]
 fn up(length: f32) -> u16 {
     let bits = if length <= f32::MAX { length.max(0.0).to_bits() } else { f32::INFINITY.to_bits() };
     ((bits + 0xffff) >> 16) as u16

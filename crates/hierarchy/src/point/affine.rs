@@ -215,7 +215,7 @@ impl Motion {
             let moved =
                 (f32x16::load_array_ref(simd, &before.radii) * spacing).min(f32x16::splat(simd, most));
             let moved = moved.to_array();
-            match radii.as_mut_array() {
+            match radii.first_chunk_mut() {
                 Some(radii) => *radii = moved,
                 None => radii.copy_from_slice(&moved[..radii.len()]),
             }
