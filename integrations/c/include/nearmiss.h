@@ -1291,9 +1291,11 @@ NearmissStatus nearmiss_mesh_to_bytes(const struct NearmissMesh *mesh,
                                       size_t *length);
 
 /*
- Writes facts about a mesh to `out`. Thread safety: any thread.
+ Writes facts about a mesh to `out`. The first call finds the closed parts, in 20 ms for 100,000 triangles.
+ Thread safety: any thread.
  */
-NearmissStatus nearmiss_mesh_about(const struct NearmissMesh *mesh, struct NearmissMeshAbout *out);
+NearmissStatus nearmiss_mesh_about(const struct NearmissMesh *mesh,
+                                   struct NearmissMeshAbout *out);
 
 /*
  Frees a mesh; null is fine. Worlds keep the meshes that were inserted. Thread safety: no other call may
@@ -1901,7 +1903,8 @@ NearmissStatus nearmiss_world_near_pairs(const struct NearmissWorld *world,
 /*
  Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
  `nearmiss_touch` does, a scan and a mesh as two scans, and other pairs exactly. A mesh is its triangles
- without an inside. `hint` counts for two scans only. Answers about shapes and meshes have no normals.
+ without an inside. `hint` counts for two scans only, and
+ `limits` for pairs without a shape. Answers about shapes and meshes have no normals.
  Thread safety: one call at a time for each scratch and each hint.
  */
 NearmissStatus nearmiss_world_collide(const struct NearmissWorld *world,
@@ -1925,7 +1928,8 @@ NearmissStatus nearmiss_world_distance(const struct NearmissWorld *world,
 
 /*
  Bounds how far body b of a pair must be moved, in any direction, to be separate from body a. `solids` is
- a `NearmissSolids`, which counts for scans. A mesh is solid where it is closed, and shapes are solid.
+ a `NearmissSolids`, which counts for scans. A mesh is solid where it is closed, and shapes are
+ solid. The margin of the plan counts for pairs with a scan.
  `limits` may be null. Takes as long as some hundred calls of `nearmiss_world_collide`, and a mesh that is
  asked about for the first time 20 ms more for 100,000 triangles. Thread safety: one call at a time for
  each scratch.

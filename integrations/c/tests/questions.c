@@ -332,6 +332,26 @@ static void worlds_of_meshes(void) {
     CHECK(out.lower > 0.029 && fabs(out.upper - 0.03) < 1e-5 && out.direction[2] < -0.99 && out.band == 0.0);
     OK(nearmiss_world_penetration(world, any, (NearmissBodyPair){second, first}, 0, NULL, scratch, &out));
     CHECK(out.upper == 0.0);
+    /* A ball inside a scanned ball touches nothing, unless that is solid. */
+    static double shell[3 * 3000];
+    for (int i = 0; i < 3000; i++) {
+        const double z = 1.0 - (2 * i + 1) / 3000.0, across = sqrt(1.0 - z * z), turn = 2.399963 * i;
+        shell[3 * i] = across * cos(turn), shell[3 * i + 1] = across * sin(turn), shell[3 * i + 2] = z;
+    }
+    NearmissPlaced around = at(0.35, 0.35, 5.0);
+    NearmissScan *scanned;
+    uint64_t hollow;
+    OK(nearmiss_scan_from_points(shell, 3000, NULL, &scanned));
+    around.scan = scanned;
+    OK(nearmiss_world_insert(world, &around, &hollow));
+    OK(nearmiss_scan_free(scanned));
+    OK(nearmiss_world_move(world, ball, &around.pose));
+    const int32_t bits[3] = {NEARMISS_SOLIDS_NONE, NEARMISS_SOLIDS_A, NEARMISS_SOLIDS_B};
+    for (int i = 0; i < 6; i++) {
+        const NearmissBodyPair nested = i < 3 ? (NearmissBodyPair){hollow, ball} : (NearmissBodyPair){ball, hollow};
+        OK(nearmiss_world_penetration(world, any, nested, bits[i % 3], NULL, scratch, &out));
+        CHECK(i == 1 || i == 5 ? out.upper > 1.0 && out.upper < 1.1 : out.upper == 0.0);
+    }
     FAILS(nearmiss_world_penetration(world, any, (NearmissBodyPair){second, 99}, 0, NULL, scratch, &out),
           NEARMISS_STATUS_ARGUMENT, "got 99");
     FAILS(nearmiss_world_penetration(world, any, pressed, 4, NULL, scratch, &out), NEARMISS_STATUS_ARGUMENT, "got 4");

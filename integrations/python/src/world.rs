@@ -246,8 +246,8 @@ impl World {
     /// scans whose surface encloses a solid: "a", "b" or "both". Shapes and the closed parts of meshes are
     /// solid anyway.
     ///
-    /// Returns (lower, upper, direction), as `Scan.penetration` does. Options are those of `Scan.collide`.
-    /// Raises `KeyError` for an unknown id.
+    /// Returns (lower, upper, direction), as `Scan.penetration` does. Options are those of `Scan.collide`;
+    /// `margin` needs a scan. Raises `KeyError` for an unknown id.
     #[pyo3(signature = (a, b, *, solid = None, **options))]
     fn penetration(
         &self,
@@ -263,6 +263,10 @@ impl World {
         let plan = CollidePlan::of_metric(&options.collide, metric).map_err(refused)?;
         let [first, second] = [a, b].map(|id| world.get(BodyId(id)).ok_or_else(|| no_body(id)));
         let bodies = [first?, second?];
+        let has_scan = bodies.iter().any(|body| matches!(body, Body::Scan(_)));
+        if options.collide.margin != 0.0 && !has_scan {
+            return Err(refused("expected no `margin` for bodies of which none is a scan"));
+        }
         let [own, other] = interiors(solid, bodies.map(|body| matches!(body, Body::Scan(_))))?;
         let pair = world.body_pair([BodyId(a), BodyId(b)]).ok_or_else(|| no_body(a))?;
         let found = ask(py, |scratch| {

@@ -204,6 +204,8 @@ class Motions(unittest.TestCase):
         lower, upper, direction = world.penetration(ground, low)
         self.assertTrue(lower <= 0.01 + 1e-6 and abs(upper - 0.01) < 2e-3 and direction[2] > 0.99)
         self.assertGreater(world.penetration(ground, low, solid="a")[1], 0.0)
+        with self.assertRaisesRegex(ValueError, "no `margin` for bodies"):
+            world.penetration(low, high, margin=0.1)
         with self.assertRaisesRegex(ValueError, "to name scans, got 'b'|to name scans, got \"b\""):
             world.penetration(ground, low, solid="b")
         for a, b in ((ground, 99), (99, ground)):

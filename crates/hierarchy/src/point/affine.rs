@@ -207,8 +207,12 @@ impl Motion {
         most: f32,
     ) {
         let [x, y, z] = &self.cofactors;
-        // Where points are fitted anew, their neighbours are compared with these radii.
-        let spacing = if self.spacing.is_finite() { self.spacing } else { 1.0 };
+        // Where points are fitted anew, these are upper limits for those of their neighbours.
+        let spacing = match self.spacing {
+            spacing if self.is_carried => spacing,
+            spacing if spacing.is_finite() => spacing.max(1.0),
+            _ => 1.0,
+        };
         let mut rows = [[0.0; WIDTH]; 3];
         let moved = normals.chunks_mut(WIDTH).zip(radii.chunks_mut(WIDTH));
         for (before, (normals, radii)) in before.iter().zip(moved) {
@@ -251,7 +255,9 @@ mod tests {
         Rest::default().spread((&before, &before, &[0.5; 20]), &mut lanes);
         let moved = (&mut normals[..], &mut radii[..]);
         dispatch!(Level::new(), simd => motion.carry(simd, &lanes, moved, 0.6));
-        let expected = if motion.spacing.is_finite() { (0.5 * motion.spacing).min(0.6) } else { 0.5 };
+        let least = if motion.is_carried { 0.0 } else { 1.0 };
+        let expected =
+            if motion.spacing.is_finite() { (0.5 * motion.spacing.max(least)).min(0.6) } else { 0.5 };
         assert!(radii.iter().all(|r| *r == expected), "{radii:?}");
         normals[17]
     }

@@ -201,11 +201,13 @@ impl Moves<'_> {
         let (leaf_size, points, frame) = (self.leaf_size, self.placed.points, self.placed.frame);
         let (all, each) = (positions.elements.len(), leaf_size.div_ceil(WIDTH));
         let of_leaf = |leaf: usize| leaf * leaf_size..all.min((leaf + 1) * leaf_size);
+        // The last leaf may fill fewer.
+        let lanes_of = |leaf: usize| leaf * each..leaf * each + of_leaf(leaf).len().div_ceil(WIDTH);
         for (k, leaf) in leaves.elements.iter_mut().enumerate().filter(|(_, leaf)| !leaf.motion.is_carried) {
             let own = (&positions.elements[of_leaf(k)], &normals.elements[of_leaf(k)]);
             leaf.rest = Rest::new(own.0, own.1);
             let own = (own.0, own.1, &radii.elements[of_leaf(k)]);
-            leaf.rest.spread(own, &mut lanes.elements[k * each..(k + 1) * each]);
+            leaf.rest.spread(own, &mut lanes.elements[lanes_of(k)]);
         }
         for (now, source) in positions.elements.iter_mut().zip(&self.source[start..]) {
             *now = frame.to_local(points[*source as usize]);
@@ -214,7 +216,7 @@ impl Moves<'_> {
             block.place(points);
         }
         for (k, leaf) in leaves.elements.iter_mut().enumerate() {
-            let rest = &lanes.elements[k * each..(k + 1) * each];
+            let rest = &lanes.elements[lanes_of(k)];
             leaf.motion = leaf.rest.motion(simd, rest, &positions.elements[of_leaf(k)], (STRETCH, OFF));
             let moved = (&mut normals.elements[of_leaf(k)], &mut radii.elements[of_leaf(k)]);
             leaf.motion.carry(simd, rest, moved, self.reach);

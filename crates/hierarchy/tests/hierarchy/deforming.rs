@@ -313,6 +313,42 @@ fn points_are_fitted_anew_where_their_spacing_changes() {
 }
 
 #[test]
+fn scans_with_leaves_of_any_size_rest_and_move_without_fits() {
+    for (leaf_size, count) in [(10, 408), (16, 403), (24, 405), (64, 394), (64, 410), (64, 30)] {
+        let options = BuildOptions::default().with_leaf_size(leaf_size);
+        let cloud = |count| arbitrary::cloud(CloudKind::Sphere, count, 9);
+        let mut scan = DeformingScan::new(&cloud(500), &options).unwrap();
+        scan.refit(&cloud(500)).unwrap();
+        // Fewer points, so that memory has more room than they need.
+        let points = cloud(count);
+        scan.replace(&points).unwrap();
+        let radii = scan.radii().to_vec();
+        let moved: Vec<[f64; 3]> = points.iter().map(|[x, y, z]| [x + 3.0, *y, *z]).collect();
+        for frame in [&points, &moved, &points] {
+            assert_eq!(scan.refit(frame).unwrap().fitted, 0, "{count} points in leaves of {leaf_size}");
+            assert!(scan.radii() == radii, "{count} points in leaves of {leaf_size} keep their radii");
+        }
+    }
+}
+
+#[test]
+fn points_beside_a_sharp_crease_keep_their_radii() {
+    let sheet = |angle: f64| -> Vec<[f64; 3]> {
+        let place = |i: u32| [f64::from(i % 61) - 26.0, f64::from(i / 61)];
+        (0..61 * 40).map(place).map(|[x, y]| [x * angle.cos(), y, x.abs() * angle.sin()]).collect()
+    };
+    let mut scan = DeformingScan::new(&sheet(0.0), &BuildOptions::default()).unwrap();
+    let angle = 80.0_f64.to_radians();
+    assert!(scan.refit(&sheet(angle)).unwrap().fitted > 0, "leaves across the crease are bent");
+    let mut anew = scan.clone();
+    anew.renew(&sheet(angle)).unwrap();
+    for (i, (refitted, renewed)) in scan.radii().iter().zip(anew.radii()).enumerate() {
+        let ratio = refitted / renewed;
+        assert!((0.7..1.8).contains(&ratio), "point {i}: {refitted}, renewed {renewed}");
+    }
+}
+
+#[test]
 fn faulty_frames_are_refused_and_change_nothing() {
     let mut points = arbitrary::cloud(CloudKind::Sphere, 100, 1);
     points.push(points[3]);

@@ -26,7 +26,8 @@ impl BodyPair<'_> {
     ///
     /// `plan` is that of [`Self::touch`]. `interiors` are those of the first and of the second body; if one
     /// is that of another kind, or of another mesh, the upper bound is infinite. `budget` counts for all
-    /// kinds but two shapes, instead of that of the pair.
+    /// kinds but two shapes, instead of that of the pair. The margin of the plan counts for pairs with a scan
+    /// only: meshes and shapes are separate where they do not touch.
     ///
     /// See [`Pair::penetration`](crate::Pair::penetration),
     /// [`MeshScanPair::penetration`](crate::MeshScanPair::penetration),

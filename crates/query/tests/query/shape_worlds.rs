@@ -386,6 +386,30 @@ fn bodies_of_all_kinds_are_apart_after_the_shift_that_penetration_tells() {
     }
     assert!(moved.iter().all(|&count| count >= 2), "all kinds: {moved:?}");
 
+    // The inside of a scanned ball counts if it is solid, whichever comes first.
+    let ball = Shape::Sphere { centre: [0.0; 3], radius: 0.1 };
+    let (at, scan) = (Pose::IDENTITY, PlacedBody::Scan(SCANS[0].at(&Pose::IDENTITY)));
+    for (mesh_or_shape, own) in [
+        (PlacedBody::Shape(ball.at(&at)), BodyInterior::Shape),
+        (PlacedBody::Mesh(mesh.at(&Pose::IDENTITY.with_scale(0.1))), BodyInterior::Mesh(&solid)),
+    ] {
+        for (interior, is_inside) in [(Interior::Hollow, false), (Interior::Solid, true)] {
+            let of_scan = BodyInterior::Scan(interior);
+            let first = BodyPair::new(scan, mesh_or_shape);
+            let second = BodyPair::new(mesh_or_shape, scan);
+            let found = first.penetration(&plan, [of_scan, own], &budget, scratch);
+            let back = second.penetration(&plan, [own, of_scan], &budget, scratch);
+            assert_eq!((found.upper > 0.9, back.upper > 0.9), (is_inside, is_inside), "{found:?}, {back:?}");
+        }
+    }
+    let small = PlacedBody::Scan(SCANS[0].at(&Pose::IDENTITY.with_scale(0.2)));
+    for (which, insides) in [[true, false], [false, true]].into_iter().enumerate() {
+        let interiors =
+            insides.map(|solid| BodyInterior::Scan(if solid { Interior::Solid } else { Interior::Hollow }));
+        let found = BodyPair::new(scan, small).penetration(&plan, interiors, &budget, scratch);
+        assert_eq!(found.upper > 0.5, which == 0, "the greater one is solid or not: {found:?}");
+    }
+
     // Interiors of other kinds, and of another mesh.
     let (other, ball) = (prepared(&cube(3)), Shape::Sphere { centre: [0.0; 3], radius: 1.0 });
     let other = MeshSolid::new(&other);
