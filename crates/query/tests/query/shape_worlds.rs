@@ -385,8 +385,16 @@ fn bodies_of_all_kinds_are_apart_after_the_shift_that_penetration_tells() {
         }
     }
     assert!(moved.iter().all(|&count| count >= 2), "all kinds: {moved:?}");
+}
 
-    // The inside of a scanned ball counts if it is solid, whichever comes first.
+#[test]
+fn penetration_counts_the_inside_of_the_body_that_is_solid() {
+    let mesh = prepared(&cube(4));
+    let solid = MeshSolid::new(&mesh);
+    let plan = CollidePlan::new(&CollideOptions::estimated(), &SCANS[0], &SCANS[1]).unwrap();
+    let (scratch, budget) = (&mut Scratch::default(), Budget::UNLIMITED);
+
+    // A scanned ball about smaller things, whichever comes first.
     let ball = Shape::Sphere { centre: [0.0; 3], radius: 0.1 };
     let (at, scan) = (Pose::IDENTITY, PlacedBody::Scan(SCANS[0].at(&Pose::IDENTITY)));
     for (mesh_or_shape, own) in [
