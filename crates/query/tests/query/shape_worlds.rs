@@ -251,6 +251,18 @@ fn invalid_shapes_and_poses_are_near_everything_and_have_no_distance() {
 
 /// Touches of all kinds of pairs agree with the distances of the same pairs, and with the questions about
 /// each kind.
+/// A number for the kinds of two bodies.
+const fn kind_of(pair: &BodyPair<'_>) -> usize {
+    match pair {
+        BodyPair::Scans(_) => 0,
+        BodyPair::MeshAndScan { .. } => 1,
+        BodyPair::Meshes(_) => 2,
+        BodyPair::ShapeAndScan { .. } => 3,
+        BodyPair::ShapeAndMesh { .. } => 4,
+        BodyPair::Shapes(_) => 5,
+    }
+}
+
 #[test]
 fn touches_of_all_kinds_agree_with_their_distances() {
     let rng = &mut rng(6105);
@@ -268,14 +280,7 @@ fn touches_of_all_kinds_agree_with_their_distances() {
                 let pair = world.body_pair([a.0, b.0]).unwrap();
                 let (found, distance) = (pair.touch(&plan, scratch), pair.distance(&apart, scratch).unwrap());
                 let context = format!("{found:?}, {distance:?}, {a:?}, {b:?}");
-                let kind = match &pair {
-                    BodyPair::Scans(_) => 0,
-                    BodyPair::MeshAndScan { .. } => 1,
-                    BodyPair::Meshes(_) => 2,
-                    BodyPair::ShapeAndScan { .. } => 3,
-                    BodyPair::ShapeAndMesh { .. } => 4,
-                    BodyPair::Shapes(_) => 5,
-                };
+                let kind = kind_of(&pair);
                 if let BodyPair::ShapeAndScan { pair, .. } = &pair {
                     let own = pair.touch(&ShapePlan::new(&options, &SCANS[0]).unwrap(), scratch);
                     assert_eq!(
@@ -348,14 +353,7 @@ fn bodies_of_all_kinds_are_apart_after_the_shift_that_penetration_tells() {
             for a in &known[..j] {
                 let (interiors, ids) = ([interior(&a.1), interior(&b.1)], [a.0, b.0]);
                 let pair = world.body_pair(ids).unwrap();
-                let kind = match &pair {
-                    BodyPair::Scans(_) => 0,
-                    BodyPair::MeshAndScan { .. } => 1,
-                    BodyPair::Meshes(_) => 2,
-                    BodyPair::ShapeAndScan { .. } => 3,
-                    BodyPair::ShapeAndMesh { .. } => 4,
-                    BodyPair::Shapes(_) => 5,
-                };
+                let kind = kind_of(&pair);
                 if moved[kind] > 20 {
                     continue;
                 }
