@@ -201,9 +201,9 @@ pub unsafe extern "C" fn nearmiss_world_near_pairs(
 
 /// Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
 /// `nearmiss_touch` does, a scan and a mesh as two scans, and other pairs exactly. A mesh is its triangles
-/// without an inside. `hint` counts for two scans only, and
-/// `limits` for pairs without a shape. Answers about shapes and meshes have no normals.
-/// Thread safety: one call at a time for each scratch and each hint.
+/// without an inside. `hint` counts for two scans only, and `limits` for pairs without a shape. Answers
+/// about shapes and meshes have no normals. Thread safety: one call at a time for each scratch and each
+/// hint.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_collide(
     world: Option<&World>,
@@ -257,11 +257,10 @@ pub extern "C" fn nearmiss_world_distance(
 }
 
 /// Bounds how far body b of a pair must be moved, in any direction, to be separate from body a. `solids` is
-/// a `NearmissSolids`, which counts for scans. A mesh is solid where it is closed, and shapes are
-/// solid. The margin of the plan counts for pairs with a scan.
-/// `limits` may be null. Takes as long as some hundred calls of `nearmiss_world_collide`, and a mesh that is
-/// asked about for the first time 20 ms more for 100,000 triangles. Thread safety: one call at a time for
-/// each scratch.
+/// a `NearmissSolids`, which counts for scans; shapes, and meshes where they are closed, are solid anyway.
+/// The margin of the plan counts for pairs with a scan. `limits` may be null. Takes as long as some hundred
+/// calls of `nearmiss_world_collide`. The first question about a mesh takes 20 ms more for 100,000 triangles.
+/// Thread safety: one call at a time for each scratch.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_penetration(
     world: Option<&World>,
