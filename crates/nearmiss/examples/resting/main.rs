@@ -14,6 +14,9 @@ use solver::{Body, GRAVITY, Kind};
 
 const STEP: f64 = 1.0 / 240.0;
 
+/// The resistance to rolling, in sizes of a body: about that of a football on grass.
+const ROLLING: f64 = 0.05;
+
 fn main() -> Result<(), Box<dyn Error>> {
     let cloud = match std::env::args_os().nth(1).map(PathBuf::from) {
         Some(path) => nearmiss::io::read(&path, None)?.cloud,
@@ -37,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let hit = target.cast(&down, &mut scratch).hit.ok_or("expected a surface below the centre")?;
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, 0.3));
         let place = [hit.point[0], hit.point[1], hit.point[2] + 1.3 * size];
-        let mut body = Body::new(kind, place, turn, [0.6, 0.01 * size]);
+        let mut body = Body::new(kind, place, turn, [0.6, ROLLING * size]);
         for step in 1..=960_u32 {
             body.step(&target, STEP, &mut scratch);
             if step % 240 == 0 {
