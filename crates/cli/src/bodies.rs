@@ -2,8 +2,8 @@
 
 use nearmiss::{
     Answer, Budget, CollideOptions, CollidePlan, Contact, ContactGroup, Contacts, Distance, DistanceOptions,
-    DistancePlan, Interior, ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, MeshSolid, Pair, Penetration,
-    Placed, PlacedMesh, PlanError, Pose, Proof, Scan, Scratch, Semantics,
+    DistancePlan, Interior, ManifoldPoint, Mesh, MeshScanPair, MeshScanPlan, Pair, Penetration, Placed,
+    PlacedMesh, PlanError, Pose, Proof, Scan, Scratch, Semantics,
 };
 
 use crate::contacts::{ContactArgs, Grouped};
@@ -34,7 +34,8 @@ pub(crate) enum Plan {
 #[derive(Debug)]
 pub(crate) enum Insides {
     Scans([Interior; 2]),
-    MeshAndScan(MeshSolid, Interior),
+    /// The closed parts of the mesh are its inside.
+    MeshAndScan(Mesh, Interior),
 }
 
 impl Insides {
@@ -42,7 +43,7 @@ impl Insides {
     pub(crate) fn has_solid(&self) -> bool {
         match self {
             Self::Scans(interiors) => interiors.contains(&Interior::Solid),
-            Self::MeshAndScan(solid, interior) => solid.is_closed() || *interior == Interior::Solid,
+            Self::MeshAndScan(mesh, interior) => mesh.solid().is_closed() || *interior == Interior::Solid,
         }
     }
 }
@@ -95,7 +96,7 @@ impl Bodies {
         match self {
             Self::Scans(_) => Insides::Scans(interiors),
             Self::MeshAndScan { mesh, mesh_is_a, .. } => {
-                Insides::MeshAndScan(MeshSolid::new(mesh), interiors[usize::from(*mesh_is_a)])
+                Insides::MeshAndScan(mesh.clone(), interiors[usize::from(*mesh_is_a)])
             }
         }
     }
@@ -219,13 +220,12 @@ impl<'a> Views<'a> {
             (
                 Self::MeshAndScan { mesh, scan, mesh_is_a },
                 Plan::MeshAndScan(plan),
-                Insides::MeshAndScan(solid, interior),
+                Insides::MeshAndScan(own, interior),
             ) => {
                 let pair = MeshScanPair::new(*scan, *mesh).within(budget);
-                let mut found = pair.penetration(plan, (*interior, solid), scratch);
+                let mut found = pair.penetration(plan, (*interior, own.solid()), scratch);
                 if *mesh_is_a {
-                    // The scan moves the other way.
-                    found.direction = found.direction.map(|x| 0.0 - x);
+                    turn(&mut found);
                 }
                 Some(found)
             }
@@ -266,8 +266,7 @@ impl<'a> Views<'a> {
         }
     }
 
-    /// Returns how far b must move out of each group of contacts of two scans, given the penetration of the
-    /// pair. Empty for a mesh and a scan.
+    /// Returns how far b must move out of each group of contacts, given the penetration of the bodies.
     pub(crate) fn depths(
         &self,
         plan: &Plan,
@@ -276,13 +275,31 @@ impl<'a> Views<'a> {
         whole: &Penetration,
         budget: &Budget,
     ) -> Vec<Penetration> {
-        let (Self::Scans([a, b]), Plan::Scans(plan), Insides::Scans(interiors)) = (self, plan, insides)
-        else {
-            return Vec::new();
-        };
         let groups: Vec<&ContactGroup> = groups.iter().collect();
-        let pair = Pair::new(*a, *b).within(budget);
-        pair.depths((contacts, &groups), (plan, *interiors), whole, &mut |_| ())
+        match (self, plan, insides) {
+            (Self::Scans([a, b]), Plan::Scans(plan), Insides::Scans(interiors)) => {
+                let pair = Pair::new(*a, *b).within(budget);
+                pair.depths((contacts, &groups), (plan, *interiors), whole, &mut |_| ())
+            }
+            (
+                Self::MeshAndScan { mesh, scan, mesh_is_a },
+                Plan::MeshAndScan(plan),
+                Insides::MeshAndScan(own, interior),
+            ) => {
+                let pair = MeshScanPair::new(*scan, *mesh).within(budget);
+                let of = (plan, *interior, own.solid());
+                if !mesh_is_a {
+                    return pair.depths((contacts, &groups), of, whole, &mut |_| ());
+                }
+                let (mut contacts, mut whole) = (contacts.to_vec(), *whole);
+                contacts.iter_mut().for_each(swap);
+                turn(&mut whole);
+                let mut found = pair.depths((&contacts, &groups), of, &whole, &mut |_| ());
+                found.iter_mut().for_each(turn);
+                found
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// Returns the unit to which lengths are rounded: a hundredth of the smaller sampling radius.
@@ -334,6 +351,12 @@ impl<'a> Views<'a> {
             }
         })
     }
+}
+
+/// Turns the shift of one body into that of the other one.
+fn turn(found: &mut Penetration) {
+    // No negative zeros.
+    found.direction = found.direction.map(|x| 0.0 - x);
 }
 
 /// Exchanges what a contact says about a and b.

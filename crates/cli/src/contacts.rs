@@ -149,13 +149,8 @@ pub(crate) struct GroupReport {
     centre: [f64; 3],
     size: [f64; 3],
     bounds: [[f64; 3]; 2],
-    /// The length of the move of b out of the clash. Null unless asked for.
-    depth: Option<f64>,
-    depth_lower: Option<f64>,
-    depth_direction: Option<[f64; 3]>,
-    /// `false` if the budget ended the search for the depth; absent otherwise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    depth_complete: Option<bool>,
+    #[serde(flatten)]
+    depth: DepthReport,
     /// The place of the contact with the least residual.
     point: [f64; 3],
     residual: f64,
@@ -166,20 +161,41 @@ pub(crate) struct GroupReport {
 impl GroupReport {
     fn new(contacts: &[Contact], group: &ContactGroup, depth: Option<&Penetration>) -> Self {
         let nearest = &contacts[group.nearest];
-        let depth = depth.filter(|depth| depth.upper.is_finite());
         Self {
             contacts: group.contacts.len(),
             centre: group.centre(),
             size: group.size(),
             bounds: [group.bounds.min, group.bounds.max],
-            depth: depth.map(|depth| depth.upper),
-            depth_lower: depth.map(|depth| depth.lower),
-            depth_direction: depth.map(|depth| depth.direction),
-            depth_complete: depth.filter(|depth| !depth.complete).map(|_| false),
+            depth: DepthReport::new(depth),
             point: nearest.point,
             residual: nearest.residual,
             source_a: nearest.sources[0].0,
             source_b: nearest.sources[1].0,
+        }
+    }
+}
+
+/// The depth of a clash, for scripts.
+#[derive(Debug, Serialize)]
+pub(crate) struct DepthReport {
+    /// The length of the move of b out of the clash. Null unless asked for.
+    depth: Option<f64>,
+    depth_lower: Option<f64>,
+    depth_direction: Option<[f64; 3]>,
+    /// `false` if the budget ended the search for the depth; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    depth_complete: Option<bool>,
+}
+
+impl DepthReport {
+    /// The report of the shift out of a clash, if one was found.
+    pub(crate) fn new(depth: Option<&Penetration>) -> Self {
+        let depth = depth.filter(|depth| depth.upper.is_finite());
+        Self {
+            depth: depth.map(|depth| depth.upper),
+            depth_lower: depth.map(|depth| depth.lower),
+            depth_direction: depth.map(|depth| depth.direction),
+            depth_complete: depth.filter(|depth| !depth.complete).map(|_| false),
         }
     }
 }

@@ -40,6 +40,24 @@ impl Aabb {
         (0..3).all(|k| self.min[k] <= p[k] && p[k] <= self.max[k])
     }
 
+    /// Returns `true` if the boxes have a point in common.
+    #[must_use]
+    pub fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
+    }
+
+    /// Returns `true` if no part of `other` is outside the box.
+    #[must_use]
+    pub fn encloses(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.min[k] && other.max[k] <= self.max[k])
+    }
+
+    /// Returns the box that extends further by `length` to every side.
+    #[must_use]
+    pub fn grown(&self, length: f64) -> Self {
+        Self { min: self.min.map(|x| x - length), max: self.max.map(|x| x + length) }
+    }
+
     /// Returns the centre of the box.
     #[must_use]
     pub fn centre(&self) -> [f64; 3] {

@@ -8,5 +8,6 @@ pub(crate) mod deforming;
 pub(crate) mod extents;
 pub(crate) mod moments;
 pub(crate) mod options;
+pub(crate) mod part;
 pub(crate) mod refit;
 pub(crate) mod stored;

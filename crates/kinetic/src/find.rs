@@ -32,11 +32,6 @@ impl Ray {
     }
 }
 
-/// Returns `true` if closed boxes have a point in common.
-fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
-}
-
 /// Returns `true` if no half-space `n · x + d ≥ 0` excludes the whole box.
 fn is_within_all(bounds: &Aabb, planes: &[[f64; 4]]) -> bool {
     planes.iter().all(|plane| {
@@ -48,7 +43,7 @@ fn is_within_all(bounds: &Aabb, planes: &[[f64; 4]]) -> bool {
 impl KineticTree {
     /// Calls `visit` with each primitive whose box now has a point in common with `bounds`.
     pub fn in_box(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
-        self.find(|own| overlap(own, bounds), visit);
+        self.find(|own| own.meets(bounds), visit);
     }
 
     /// Calls `visit` with each primitive whose box is now in or partly in all half-spaces

@@ -12,12 +12,9 @@
 //! A near contact is the first one found for two leaves, not the nearest. The distance of a
 //! clearance clash is therefore bounded from above by the nearest points of the same leaves. It is
 //! bounded from below by the enclosures of these leaves, or by the balls about their points.
-//!
-//! The depth of a hard clash is the penetration of the parts of both scans around it. The parts grow until
-//! the shift that separates them is short against them, so that what was left out does not matter.
 
 mod components;
-mod depth;
+mod depths;
 mod group;
 mod least;
 mod measure;
@@ -33,6 +30,7 @@ pub use group::ContactGroup;
 
 use crate::ask::answer::{Answer, Contact, Contacts, Evidence};
 use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
+use crate::mesh::answer::MeshContact;
 use crate::pair::placed::Placed;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::question::{Pair, Scratch};
@@ -156,6 +154,16 @@ impl ClashPlan {
 #[must_use]
 pub fn default_link(views: [&Placed<'_>; 2]) -> f64 {
     LINK * views.map(Placed::sampling_radius).into_iter().fold(0.0, f64::max)
+}
+
+/// The default link length of contacts of meshes: that of the longest segment that two triangles have in common.
+/// On a curve of contacts, the middles of neighbouring segments are no further apart.
+#[must_use]
+pub fn default_mesh_link(contacts: &[MeshContact]) -> f64 {
+    let length = |[p, q]: [[f64; 3]; 2]| [0, 1, 2].map(|k| q[k] - p[k]).into_iter().fold(0.0, f64::hypot);
+    let longest = contacts.iter().map(|contact| length(contact.ends)).fold(0.0, f64::max);
+    // Rounding may move the middles apart.
+    longest * (1.0 + 1e-9)
 }
 
 /// The kinds of clashes.

@@ -1,7 +1,7 @@
 //! `mesh-collide`: tests whether two meshes meet, and where.
 
 use nearmiss::{
-    MeshAnswer, MeshContact, MeshDistance, MeshPair, MeshQuality, MeshScratch, MeshSolid, MeshVerdict,
+    Mesh, MeshAnswer, MeshContact, MeshDistance, MeshPair, MeshQuality, MeshScratch, MeshSolid, MeshVerdict,
     Penetration, Pose, Scratch,
 };
 use nearmiss_draw::picture::Picture;
@@ -29,8 +29,6 @@ struct Question<'a> {
     args: &'a MeshCollideArgs,
     /// `true` if the clearance of separated poses is needed.
     clearance: bool,
-    /// The solids of both meshes, with `--penetration`.
-    solids: Option<[MeshSolid; 2]>,
 }
 
 /// A query and its answer.
@@ -87,8 +85,7 @@ pub(crate) fn run(args: &MeshCollideArgs) -> Result<(), CliError> {
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
     let meshes = TwoMeshes::open(&args.pair, args.threads, (args.budget, args.work), console)?;
     let clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
-    let solids = args.penetration.then(|| meshes.both().map(|mesh| MeshSolid::new(mesh)));
-    let question = Question { meshes, args, clearance, solids };
+    let question = Question { meshes, args, clearance };
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
@@ -154,9 +151,16 @@ impl Question<'_> {
         let clearance = wants_clearance.then(|| self.meshes.pair(&poses, now()).distance(scratch));
         // An infinite distance is that of an invalid pose.
         let clearance = clearance.filter(|found| found.upper.is_finite());
-        let solids = self.solids.as_ref().map(|solids| solids.each_ref());
-        let penetration = solids.map(|solids| self.meshes.pair(&poses, now()).penetration(solids, scratch));
+        let penetration = self
+            .args
+            .penetration
+            .then(|| self.meshes.pair(&poses, now()).penetration(self.solids(), scratch));
         Asked { line, time, poses, answer, contacts, clearance, penetration, micros }
+    }
+
+    /// Returns the solids of both meshes.
+    fn solids(&self) -> [&MeshSolid; 2] {
+        self.meshes.both().map(Mesh::solid)
     }
 
     /// Tests the meshes as well as --p-min and --k-min ask for.
@@ -193,7 +197,13 @@ impl Question<'_> {
     fn tell(&self, asked: &Asked, results: &mut Results) -> Result<(), CliError> {
         self.meshes.compare_sizes(&asked.poses);
         let all = asked.contacts.as_ref();
-        let grouped = all.map(|(all, complete)| (MeshContacts::new(all, &self.args.contacts), *complete));
+        let grouped = all.map(|(all, complete)| {
+            let mut all = MeshContacts::new(all, &self.args.contacts);
+            if let Some(whole) = &asked.penetration {
+                all.measure(&self.meshes.pair(&asked.poses, now()), self.solids(), whole);
+            }
+            (all, *complete)
+        });
         if let Some((all, _)) = &grouped {
             let csv = self.args.path.csv.as_deref().filter(|_| asked.line.is_none());
             all.write(csv, &self.args.contacts)?;

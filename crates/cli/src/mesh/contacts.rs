@@ -3,10 +3,11 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use nearmiss::{Contact, ContactGroup, MeshContact, PointId};
+use nearmiss::query::default_mesh_link;
+use nearmiss::{Contact, ContactGroup, MeshContact, MeshPair, MeshSolid, Penetration};
 use serde::Serialize;
 
-use crate::contacts::{ContactArgs, Grouped, write_ply};
+use crate::contacts::{ContactArgs, DepthReport, Grouped, write_ply};
 use crate::error::CliError;
 use crate::output;
 
@@ -20,23 +21,18 @@ pub(crate) struct MeshContacts<'a> {
 }
 
 impl<'a> MeshContacts<'a> {
-    /// Groups `contacts` by the link length of the options. The default is the length of the longest
-    /// segment that two triangles have in common: on a curve of contacts, the middles of
-    /// neighbouring segments are no further apart.
+    /// Groups `contacts` by the link length of the options, or else by the default for these contacts.
     pub(crate) fn new(contacts: &'a [MeshContact], args: &ContactArgs) -> Self {
-        let place = |contact: &MeshContact| Contact {
-            point: contact.point,
-            normals: Some(contact.normals),
-            residual: 0.0,
-            sources: contact.triangles.map(PointId),
-        };
-        let length = |[p, q]: [[f64; 3]; 2]| [0, 1, 2].map(|k| q[k] - p[k]).into_iter().fold(0.0, f64::hypot);
-        let longest = contacts.iter().map(|contact| length(contact.ends)).fold(0.0, f64::max);
-        // Rounding may move the middles apart.
-        let link = args.link.unwrap_or(longest * (1.0 + 1e-9));
-        let places: Vec<Contact> = contacts.iter().map(place).collect();
+        let link = args.link.unwrap_or_else(|| default_mesh_link(contacts));
+        let places: Vec<Contact> = contacts.iter().map(Contact::from).collect();
         let grouped = Grouped::new(&places, link);
         Self { contacts, places, grouped }
+    }
+
+    /// Measures how far b of `pair` must move out of each clash, given the penetration of the pair.
+    pub(crate) fn measure(&mut self, pair: &MeshPair<'_>, solids: [&MeshSolid; 2], whole: &Penetration) {
+        let groups: Vec<&ContactGroup> = self.grouped.groups.iter().collect();
+        self.grouped.depths = pair.depths((self.contacts, &groups), solids, whole, &mut |_| ());
     }
 
     /// Returns the length up to which contacts are linked.
@@ -92,16 +88,16 @@ impl<'a> MeshContacts<'a> {
 
     /// Returns the clashes, for scripts.
     pub(crate) fn clashes(&self) -> Vec<MeshClashReport> {
-        let report = |group: &ContactGroup| MeshClashReport {
+        let report = |(i, group): (usize, &ContactGroup)| MeshClashReport {
             contacts: group.contacts.len(),
             centre: group.centre(),
             size: group.size(),
             bounds: [group.bounds.min, group.bounds.max],
-            depth: (),
+            depth: DepthReport::new(self.grouped.depths.get(i)),
             point: self.contacts[group.nearest].point,
             triangles: self.contacts[group.nearest].triangles,
         };
-        self.grouped.groups.iter().map(report).collect()
+        self.grouped.groups.iter().enumerate().map(report).collect()
     }
 }
 
@@ -125,8 +121,8 @@ pub(crate) struct MeshClashReport {
     centre: [f64; 3],
     size: [f64; 3],
     bounds: [[f64; 3]; 2],
-    /// The penetration depth. Always null: no search computes it yet.
-    depth: (),
+    #[serde(flatten)]
+    depth: DepthReport,
     point: [f64; 3],
     triangles: [u32; 2],
 }

@@ -1,4 +1,4 @@
-//! The positions in storage of the points of contacts.
+//! The positions in storage of the points and triangles of contacts.
 
 use crate::ask::answer::Contact;
 use crate::pair::placed::Placed;
@@ -9,19 +9,24 @@ pub(crate) fn stored(views: [&Placed<'_>; 2], contacts: &[Contact]) -> Vec<[usiz
     of_a.into_iter().zip(of_b).map(|(a, b)| [a, b]).collect()
 }
 
-fn stored_of(view: &Placed<'_>, contacts: &[Contact], side: usize) -> Vec<usize> {
-    let sources = || contacts.iter().map(|contact| contact.sources[side].0);
-    let mut wanted: Vec<u32> = sources().collect();
+/// Returns the index of the stored point of scan `side` for each contact.
+pub(crate) fn stored_of(view: &Placed<'_>, contacts: &[Contact], side: usize) -> Vec<usize> {
+    positions(view.scan().source(), || contacts.iter().map(|contact| contact.sources[side].0))
+}
+
+/// Returns the position of each id in `source`, or 0 for ids that are not there.
+pub(crate) fn positions<I: Iterator<Item = u32>>(source: &[u32], ids: impl Fn() -> I) -> Vec<usize> {
+    let mut wanted: Vec<u32> = ids().collect();
     wanted.sort_unstable();
     wanted.dedup();
-    // One pass over the points, and memory for the contacts only: a scan may exceed memory.
+    // One pass over the source, and memory for the contacts only: a scan may exceed memory.
     let mut stored = vec![0; wanted.len()];
-    for (i, id) in view.scan().source().iter().enumerate() {
+    for (i, id) in source.iter().enumerate() {
         if let Ok(at) = wanted.binary_search(id) {
             stored[at] = i;
         }
     }
-    sources().map(|id| wanted.binary_search(&id).map_or(0, |at| stored[at])).collect()
+    ids().map(|id| wanted.binary_search(&id).map_or(0, |at| stored[at])).collect()
 }
 
 /// Returns the numbers of the leaves that hold two stored points.

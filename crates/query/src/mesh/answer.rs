@@ -1,8 +1,9 @@
 //! The answers about two meshes.
 
+use nearmiss_geometry::PointId;
 use serde::{Deserialize, Serialize};
 
-use crate::ask::answer::Statistics;
+use crate::ask::answer::{Contact, Statistics};
 
 /// The verdict on whether two meshes meet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,6 +47,15 @@ pub struct MeshContact {
     pub normals: [[f64; 3]; 2],
     /// The triangles, as the caller numbered them.
     pub triangles: [u32; 2],
+}
+
+impl From<&MeshContact> for Contact {
+    /// The same contact in the form that contacts of scans have, to be [grouped](crate::ContactGroup::all).
+    /// The sources are the triangles.
+    fn from(contact: &MeshContact) -> Self {
+        let MeshContact { point, normals, triangles, .. } = *contact;
+        Self { point, normals: Some(normals), residual: 0.0, sources: triangles.map(PointId) }
+    }
 }
 
 /// Where two meshes are most likely to meet, in the world.

@@ -60,6 +60,11 @@ impl MeshScratch {
     pub(crate) fn stack(&mut self) -> (Level, &mut Stack) {
         (self.level, &mut self.stack)
     }
+
+    /// What a penetration needs.
+    pub(crate) fn of_penetration(&mut self) -> (Level, &mut Stack, &mut ContactSurvey) {
+        (self.level, &mut self.stack, &mut self.penetration)
+    }
 }
 
 /// Two placed meshes and the budget of each question about them.
@@ -105,6 +110,11 @@ impl<'a> MeshPair<'a> {
     #[must_use]
     pub fn within(self, budget: &Budget) -> Self {
         Self { budget: *budget, ..self }
+    }
+
+    /// The budget of each question.
+    pub(crate) fn budget(&self) -> &Budget {
+        &self.budget
     }
 
     /// Both meshes.
@@ -188,8 +198,8 @@ impl<'a> MeshPair<'a> {
     ///
     /// Costs 300 to 1000 boolean queries without a budget. Does not allocate once `scratch` is warm.
     pub fn penetration(&self, solids: [&MeshSolid; 2], scratch: &mut MeshScratch) -> Penetration {
-        let MeshScratch { level, stack, penetration: own, .. } = scratch;
-        penetration(self.meshes, solids, &self.budget, (*level, stack), own)
+        let (level, stack, own) = scratch.of_penetration();
+        penetration(self.meshes, solids, &self.budget, (level, stack), own)
     }
 
     /// Calls `ask` with the pair under its relative pose; `None` if a pose is invalid.

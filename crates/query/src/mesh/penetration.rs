@@ -5,7 +5,7 @@ mod probe;
 mod triangle_depth;
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::Stack;
+use nearmiss_hierarchy::{MeshHierarchy, Stack};
 
 use crate::ask::answer::Evidence;
 use crate::ask::budget::Budget;
@@ -16,19 +16,48 @@ use crate::penetration::search::search;
 use crate::penetration::survey::ContactSurvey;
 use probe::MeshProbe;
 
+/// A placed mesh or a part of one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MeshPiece<'s> {
+    pub(crate) part: PlacedMesh<'s>,
+    /// The pieces of the part.
+    pub(crate) pieces: &'s MeshSolid,
+    /// The whole mesh, at the same pose.
+    pub(crate) whole: &'s MeshHierarchy,
+    /// The solid of the whole mesh.
+    pub(crate) solid: &'s MeshSolid,
+}
+
+impl<'s> MeshPiece<'s> {
+    pub(crate) fn whole(mesh: PlacedMesh<'s>, solid: &'s MeshSolid) -> Self {
+        Self { part: mesh, pieces: solid, whole: mesh.mesh(), solid }
+    }
+}
+
 /// Bounds the penetration of two placed meshes with these solids.
 pub(crate) fn penetration(
-    meshes: [PlacedMesh<'_>; 2],
+    [a, b]: [PlacedMesh<'_>; 2],
     solids: [&MeshSolid; 2],
+    budget: &Budget,
+    working: (Level, &mut Stack),
+    survey: &mut ContactSurvey,
+) -> Penetration {
+    if !(solids[0].is_of(a.mesh()) && solids[1].is_of(b.mesh())) {
+        return Penetration::UNKNOWN;
+    }
+    of_pieces([MeshPiece::whole(a, solids[0]), MeshPiece::whole(b, solids[1])], budget, working, survey)
+}
+
+/// Bounds the penetration of two placed meshes or parts of meshes.
+pub(crate) fn of_pieces(
+    pieces: [MeshPiece<'_>; 2],
     budget: &Budget,
     (level, stack): (Level, &mut Stack),
     survey: &mut ContactSurvey,
 ) -> Penetration {
-    if !(solids[0].is_of(meshes[0].mesh()) && solids[1].is_of(meshes[1].mesh())) {
-        return Penetration::UNKNOWN;
-    }
-    let views = meshes.map(|placed| placed.mesh().arrays());
-    let mut probe = MeshProbe::new(meshes, &views, solids, budget, (level, stack));
+    let views = pieces.map(|piece| piece.part.mesh().arrays());
+    let wholes = pieces.map(|piece| piece.whole.arrays());
+    let mut probe = MeshProbe::new(pieces, [&views, &wholes], budget, (level, stack));
     let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
     let bounds = search(&mut probe, out, survey);
     Penetration::new(&bounds, (1.0, |way| way.into()), (Evidence::Certified, 0.0), probe.spent)

@@ -41,7 +41,7 @@ impl MeshSolid {
             }));
         }
         edges.sort_unstable();
-        let mut parts = Parts((0..id32(view.triangles.len())).collect());
+        let mut parts = Parts::new(view.triangles.len());
         for two in edges.windows(2).filter(|two| two[0].0 == two[1].0) {
             parts.join(two[0].1, two[1].1);
         }
@@ -69,6 +69,11 @@ impl MeshSolid {
         !self.closed.is_empty()
     }
 
+    /// Returns `true` if the `i`-th triangle in leaf order belongs to a closed part.
+    pub(crate) fn is_closed_at(&self, i: usize) -> bool {
+        self.closed.get(i).is_some_and(|is_closed| *is_closed)
+    }
+
     /// Returns `true` if this is the solid of `mesh`.
     pub(crate) fn is_of(&self, mesh: &MeshHierarchy) -> bool {
         self.identity == mesh.identity()
@@ -82,10 +87,16 @@ impl MeshSolid {
 }
 
 /// Sets of triangles that are joined (union–find with path halving).
-struct Parts(Vec<u32>);
+pub(crate) struct Parts(Vec<u32>);
 
 impl Parts {
-    fn root(&mut self, mut i: u32) -> u32 {
+    /// Sets of one triangle each.
+    pub(crate) fn new(count: usize) -> Self {
+        Self((0..id32(count)).collect())
+    }
+
+    /// The least triangle of the set of `i`.
+    pub(crate) fn root(&mut self, mut i: u32) -> u32 {
         while self.0[i as usize] != i {
             let above = self.0[self.0[i as usize] as usize];
             self.0[i as usize] = above;
@@ -95,7 +106,7 @@ impl Parts {
     }
 
     /// Joins two sets; the root of both is the lesser triangle.
-    fn join(&mut self, i: u32, j: u32) {
+    pub(crate) fn join(&mut self, i: u32, j: u32) {
         let (i, j) = (self.root(i), self.root(j));
         self.0[i.max(j) as usize] = i.min(j);
     }
@@ -215,7 +226,7 @@ impl PlaceVisitor for Ray<'_> {
         let [from, to] = self.corners;
         let segment = [from, to, to];
         for i in self.of.view.tree.topology().points_of_leaf(number) {
-            if !self.of.solid.closed.get(i).is_some_and(|closed| *closed) {
+            if !self.of.solid.is_closed_at(i) {
                 continue;
             }
             let corners = self.of.view.corners(i);

@@ -80,6 +80,11 @@ impl<'a> MeshScanPair<'a> {
         Self { budget: *budget, ..self }
     }
 
+    /// The budget of each question.
+    pub(crate) fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
     /// The scan.
     #[must_use]
     pub fn scan(&self) -> &Placed<'a> {

@@ -10,6 +10,7 @@ use crate::ask::budget::Budget;
 use crate::ask::options::Semantics;
 use crate::contact::collide::ContactScratch;
 use crate::mesh::foot::{depth_in_solid, foot};
+use crate::mesh::penetration::MeshPiece;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::{MeshSolid, SolidView};
 use crate::mesh_scan::collide::{AskedOfMesh, collide};
@@ -22,7 +23,7 @@ use crate::penetration::interior::{
     contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
 };
 use crate::penetration::probe::{Deep, Probe, SLACK};
-use crate::penetration::scans::PenetrationScratch;
+use crate::penetration::scans::{PenetrationScratch, Piece};
 use crate::penetration::search::search;
 use crate::penetration::survey::{ContactSurvey, way_out};
 use crate::solid::cast::Crossing;
@@ -31,14 +32,16 @@ use crate::solid::plan::ShapePlan;
 
 type Vector = Vector3<f64>;
 
-/// A placed scan as a, a placed mesh as b, and the cost of all tests so far. Shifts are those of the mesh,
-/// in the world.
+/// A placed scan as a, a placed mesh as b, or parts of them, and the cost of all tests so far. Shifts are
+/// those of the mesh, in the world.
 struct MeshScanProbe<'s> {
     scan: Placed<'s>,
     elements: Elements<'s>,
-    mesh: PlacedMesh<'s>,
+    /// The whole scan, whose surface encloses the solid.
+    whole_scan: Elements<'s>,
+    mesh: MeshPiece<'s>,
     view: &'s MeshView<'s>,
-    solid: &'s MeshSolid,
+    whole_view: &'s MeshView<'s>,
     /// `true` for each of the scan and the mesh whose inside counts.
     are_solid: [bool; 2],
     plan: MeshScanPlan,
@@ -53,23 +56,40 @@ struct MeshScanProbe<'s> {
 pub(crate) fn penetration<'s>(
     (scan, mesh): (Placed<'s>, PlacedMesh<'s>),
     (interior, solid): (Interior, &'s MeshSolid),
+    asked: (&MeshScanPlan, &Budget),
+    working: (&'s mut ContactScratch, &'s mut Vec<Crossing>),
+    scratch: &'s mut PenetrationScratch,
+) -> Penetration {
+    if !solid.is_of(mesh.mesh()) {
+        return Penetration::UNKNOWN;
+    }
+    of_pieces((Piece::whole(&scan), MeshPiece::whole(mesh, solid)), interior, asked, working, scratch)
+}
+
+/// Bounds the penetration of a scan and a mesh or parts of them.
+pub(crate) fn of_pieces<'s>(
+    (scan, mesh): (Piece<'s>, MeshPiece<'s>),
+    interior: Interior,
     (plan, budget): (&MeshScanPlan, &Budget),
     (contact, crossings): (&'s mut ContactScratch, &'s mut Vec<Crossing>),
     scratch: &'s mut PenetrationScratch,
 ) -> Penetration {
-    if !solid.is_of(mesh.mesh()) || !is_proper(scan.stored_to_world()) || !is_proper(mesh.stored_to_world()) {
+    let Piece { part: scan, whole } = scan;
+    if !is_proper(scan.stored_to_world()) || !is_proper(mesh.part.stored_to_world()) {
         return Penetration::UNKNOWN;
     }
-    let elements = Elements::new(scan, &ShapePlan::of_pair(plan.options()));
-    let view = mesh.mesh().arrays();
+    let of_shapes = ShapePlan::of_pair(plan.options());
+    let (elements, whole_scan) = (Elements::new(scan, &of_shapes), Elements::new(whole, &of_shapes));
+    let (view, whole_view) = (mesh.part.mesh().arrays(), mesh.whole.arrays());
     let PenetrationScratch { survey, contacts } = scratch;
     let mut probe = MeshScanProbe {
         scan,
         elements,
+        whole_scan,
         mesh,
         view: &view,
-        solid,
-        are_solid: [counts(&elements, interior), solid.is_closed()],
+        whole_view: &whole_view,
+        are_solid: [counts(&elements, interior), mesh.solid.is_closed()],
         plan: plan.of_verdicts(),
         budget: Budget { resolution: None, ..*budget },
         contact,
@@ -96,7 +116,7 @@ impl<'s> MeshScanProbe<'s> {
         contacts: Option<&mut Contacts>,
         budget: &Budget,
     ) -> Answer {
-        let mesh = self.mesh.shifted(t.into());
+        let mesh = self.mesh.part.shifted(t.into());
         let asked = AskedOfMesh { scan: &self.scan, mesh: &mesh, plan, budget };
         let answer = collide(asked, self.contact, (None, contacts));
         self.spent.add(&answer.statistics);
@@ -115,7 +135,7 @@ impl<'s> MeshScanProbe<'s> {
 
     /// A ball about the mesh, in the world.
     fn ball_of_mesh(&self) -> (Vector, f64) {
-        let placed = self.mesh.stored_to_world();
+        let placed = self.mesh.part.stored_to_world();
         (placed.apply(self.view.ball.centre).into(), self.view.ball.radius * placed.scale())
     }
 
@@ -123,13 +143,16 @@ impl<'s> MeshScanProbe<'s> {
     fn out_of_balls(&mut self) -> Option<Vector> {
         let (balls, plan) = ([world_ball(&self.elements), self.ball_of_mesh()], self.plan);
         out_of_balls(balls, plan.options().margin, |t| {
-            self.collide_with(t, &plan, None, &Budget::UNLIMITED).verdict.is_separated()
+            let answer = self.collide_with(t, &plan, None, &Budget::UNLIMITED);
+            // A part may be inside the solid even far from the other part.
+            answer.verdict.is_separated() && !self.are_nested(t)
         })
     }
 
+    /// The solid of the whole mesh.
     fn solid_view(&self) -> SolidView<'s> {
-        let (mesh, level) = (self.mesh.mesh(), self.contact.level);
-        SolidView { mesh, view: self.view, solid: self.solid, level }
+        let MeshPiece { whole: mesh, solid, .. } = self.mesh;
+        SolidView { mesh, view: self.whole_view, solid, level: self.contact.level }
     }
 
     /// Returns `true` if a part of one is inside the other, which is solid, after a shift.
@@ -137,17 +160,17 @@ impl<'s> MeshScanProbe<'s> {
     /// If the surfaces do not meet, each part is inside or outside as a whole.
     fn are_nested(&mut self, t: Vector) -> bool {
         let [is_scan_solid, is_mesh_solid] = self.are_solid;
-        let (pose, solid) = (*self.mesh.pose(), self.solid_view());
+        let (pose, solid) = (*self.mesh.part.pose(), self.solid_view());
         let of_scan =
             || some_points(&self.scan).into_iter().map(|place| pose.apply_inverse((place - t).into()));
         if is_mesh_solid && of_scan().any(|place| solid.contains(place)) {
             return true;
         }
         is_scan_solid
-            && self.solid.places(self.view).any(|place| {
+            && self.mesh.pieces.places(self.view).any(|place| {
                 self.spent.evaluations += 1;
                 let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
-                contains(&self.elements, &(Vector::from(pose.apply(place)) + t), working)
+                contains(&self.whole_scan, &(Vector::from(pose.apply(place)) + t), working)
             })
     }
 
@@ -160,19 +183,19 @@ impl<'s> MeshScanProbe<'s> {
             found.place = point;
             found.depth += radius;
         }
-        let (pose, solid) = (*self.mesh.pose(), self.solid_view());
+        let (mesh, level) = (self.mesh.part, self.contact.level);
         if !is_mesh_solid {
-            let own = pose.apply_inverse(found.place.into());
-            found.place = pose.apply(foot(solid.mesh, solid.view, solid.level, own)).into();
+            let own = mesh.pose().apply_inverse(found.place.into());
+            found.place = mesh.pose().apply(foot(mesh.mesh(), self.view, level, own)).into();
         }
         if is_scan_solid {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
-            let (depth, uphill) = world_depth_in(&self.elements, &found.place, working)?;
+            let (depth, uphill) = world_depth_in(&self.whole_scan, &found.place, working)?;
             found.depth += depth;
             found.uphill += uphill;
         }
         if is_mesh_solid {
-            let (depth, uphill) = depth_in_solid(&solid, &self.mesh, found.place)?;
+            let (depth, uphill) = depth_in_solid(&self.solid_view(), &mesh, found.place)?;
             found.depth += depth;
             found.uphill += uphill;
         }
@@ -228,7 +251,7 @@ impl Probe for MeshScanProbe<'_> {
     }
 
     fn axes(&self) -> [[Vector; 3]; 2] {
-        let placed = self.mesh.stored_to_world();
+        let placed = self.mesh.part.stored_to_world();
         let of_mesh = self.view.tree.root_box().axes;
         [world_axes(&self.elements), of_mesh.map(|axis| placed.rotate(axis.map(f64::from)).into())]
     }

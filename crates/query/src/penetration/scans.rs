@@ -53,7 +53,7 @@ pub(crate) struct Piece<'s> {
 }
 
 impl<'s> Piece<'s> {
-    fn whole(scan: &Placed<'s>) -> Self {
+    pub(crate) fn whole(scan: &Placed<'s>) -> Self {
         Self { part: *scan, whole: *scan }
     }
 }

@@ -14,6 +14,7 @@ mod interpolation;
 mod interpolation_leaves;
 mod manifold;
 mod margin;
+mod mesh_clashes;
 mod mesh_scan_penetration;
 mod mesh_scans;
 mod mesh_worlds;

@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 
 use fearless_simd::Level;
-use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{MeshView, Stack};
 
 use crate::ask::answer::Statistics;
@@ -11,6 +10,7 @@ use crate::ask::budget::Budget;
 use crate::mesh::collide::first_met;
 use crate::mesh::foot::depth_in_solid;
 use crate::mesh::mesh_pair::MeshPairing;
+use crate::mesh::penetration::MeshPiece;
 use crate::mesh::penetration::contacts::survey;
 use crate::mesh::penetration::triangle_depth::triangle_depth;
 use crate::mesh::placed::PlacedMesh;
@@ -19,12 +19,17 @@ use crate::penetration::apart::out_of_balls;
 use crate::penetration::probe::{Deep, Probe, Vector};
 use crate::penetration::survey::ContactSurvey;
 
-/// Two placed meshes with their solids, and the cost of all tests so far. Shifts are those of b, in
-/// the world.
+/// Two placed meshes, or parts of them, with their solids, and the cost of all tests so far. Shifts are
+/// those of b, in the world.
 pub(crate) struct MeshProbe<'s> {
     meshes: [PlacedMesh<'s>; 2],
     views: &'s [MeshView<'s>; 2],
-    solids: [&'s MeshSolid; 2],
+    /// The pieces of each mesh.
+    pieces: [&'s MeshSolid; 2],
+    /// The solids, of the whole meshes; `None` without a closed part.
+    solids: [Option<SolidView<'s>>; 2],
+    /// `true` if both meshes are whole ones.
+    are_whole: bool,
     budget: Budget,
     level: Level,
     stack: &'s mut Stack,
@@ -32,14 +37,28 @@ pub(crate) struct MeshProbe<'s> {
 }
 
 impl<'s> MeshProbe<'s> {
+    /// A probe of meshes, given the arrays of both and of both whole meshes.
     pub(crate) fn new(
-        meshes: [PlacedMesh<'s>; 2],
-        views: &'s [MeshView<'s>; 2],
-        solids: [&'s MeshSolid; 2],
+        pieces: [MeshPiece<'s>; 2],
+        [views, wholes]: [&'s [MeshView<'s>; 2]; 2],
         budget: &Budget,
         (level, stack): (Level, &'s mut Stack),
     ) -> Self {
-        Self { meshes, views, solids, budget: *budget, level, stack, spent: Statistics::default() }
+        let solids = [0, 1].map(|k: usize| {
+            let MeshPiece { whole, solid, .. } = pieces[k];
+            solid.is_closed().then_some(SolidView { mesh: whole, view: &wholes[k], solid, level })
+        });
+        Self {
+            meshes: pieces.map(|piece| piece.part),
+            views,
+            pieces: pieces.map(|piece| piece.pieces),
+            solids,
+            are_whole: pieces.iter().all(|piece| std::ptr::eq(piece.part.mesh(), piece.whole)),
+            budget: *budget,
+            level,
+            stack,
+            spent: Statistics::default(),
+        }
     }
 
     /// Returns the meshes with b shifted by `t`.
@@ -61,29 +80,35 @@ impl<'s> MeshProbe<'s> {
         self.budget.less(self.spent.work())
     }
 
-    /// Returns a shift after which the bounding balls are apart; `None` if a pose is invalid.
-    pub(crate) fn out_of_balls(&self) -> Option<Vector> {
+    /// Returns a shift after which the meshes are apart, as their bounding balls are; `None` if a pose is
+    /// invalid.
+    pub(crate) fn out_of_balls(&mut self) -> Option<Vector> {
         let balls = [0, 1].map(|k: usize| {
             let (placed, ball) = (self.meshes[k].stored_to_world(), self.views[k].ball);
             (Vector::from(placed.apply(ball.centre)), ball.radius * placed.scale())
         });
-        out_of_balls(balls, 0.0, |t| self.pair(&self.shifted(t)).is_some_and(|pair| pair.gap > 0.0))
-    }
-
-    /// Returns `true` if a part of the other mesh begins inside the solid of mesh `k`.
-    fn has_part_inside(&mut self, k: usize, poses: &[Pose; 2]) -> bool {
-        let Some(outer) = self.solid(k) else { return false };
-        let other = 1 - k;
-        self.solids[other].places(&self.views[other]).any(|place| {
-            self.spent.evaluations += 1;
-            outer.contains(poses[k].apply_inverse(poses[other].apply(place)))
+        out_of_balls(balls, 0.0, |t| {
+            let meshes = self.shifted(t);
+            // A part may be inside a solid even far from the other part.
+            self.pair(&meshes).is_some_and(|pair| pair.gap > 0.0) && !self.are_nested(true, &meshes)
         })
     }
 
-    /// Returns the solid of mesh `k`; `None` if it has no closed part.
-    fn solid(&self, k: usize) -> Option<SolidView<'s>> {
-        let solid = Some(self.solids[k]).filter(|solid| solid.is_closed())?;
-        Some(SolidView { mesh: self.meshes[k].mesh(), view: &self.views[k], solid, level: self.level })
+    /// Returns `true` if a piece of one mesh begins inside the solid of the other, for meshes without common
+    /// points, whose bounding balls are apart or not.
+    fn are_nested(&mut self, are_balls_apart: bool, meshes: &[PlacedMesh<'_>; 2]) -> bool {
+        if self.are_whole && are_balls_apart {
+            return false;
+        }
+        let poses = meshes.map(|placed| *placed.pose());
+        (0..2).any(|k| {
+            let Some(outer) = self.solids[k] else { return false };
+            let other = 1 - k;
+            self.pieces[other].places(&self.views[other]).any(|place| {
+                self.spent.evaluations += 1;
+                outer.contains(poses[k].apply_inverse(poses[other].apply(place)))
+            })
+        })
     }
 }
 
@@ -113,10 +138,7 @@ impl Probe for MeshProbe<'_> {
             return ControlFlow::Continue(false);
         }
         flow?;
-        let poses = meshes.map(|placed| *placed.pose());
-        let is_nested =
-            !are_balls_apart && (self.has_part_inside(0, &poses) || self.has_part_inside(1, &poses));
-        ControlFlow::Continue(!is_nested)
+        ControlFlow::Continue(!self.are_nested(are_balls_apart, &meshes))
     }
 
     fn survey(&mut self, found: &mut ContactSurvey) -> ControlFlow<()> {
@@ -128,7 +150,7 @@ impl Probe for MeshProbe<'_> {
     }
 
     fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
-        let (Some(a), Some(b)) = (self.solid(0), self.solid(1)) else { return ControlFlow::Continue(None) };
+        let [Some(a), Some(b)] = self.solids else { return ControlFlow::Continue(None) };
         let meshes = self.meshes;
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         pair.meter.go_on()?;

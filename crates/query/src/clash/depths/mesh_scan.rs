@@ -1,0 +1,62 @@
+//! The depths of clashes of a scan and a mesh.
+
+use nearmiss_surface::Metric;
+
+use crate::ask::answer::Contact;
+use crate::clash::default_link;
+use crate::clash::depths::mesh_part::{MeshPart, PartedMesh};
+use crate::clash::depths::scan_part::{PartedScan, ScanPart};
+use crate::clash::depths::{OfParts, depth, each};
+use crate::clash::group::ContactGroup;
+use crate::clash::stored::stored_of;
+use crate::mesh::solid::MeshSolid;
+use crate::mesh_scan::pair::MeshScanPair;
+use crate::mesh_scan::penetration::of_pieces;
+use crate::mesh_scan::plan::MeshScanPlan;
+use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::scans::Piece;
+use crate::question::Scratch;
+
+impl MeshScanPair<'_> {
+    /// Bounds, for each of some groups of contacts, how far the mesh must at least be shifted so that it is
+    /// separate from the scan there.
+    ///
+    /// Has the definition, the bounds, the arguments and the cost of [`Pair::depths`](crate::Pair::depths);
+    /// parts of the mesh are those of [`MeshPair::depths`](crate::MeshPair::depths). `whole` is the
+    /// [penetration](Self::penetration) of the pair with the same plan and insides.
+    #[must_use]
+    pub fn depths(
+        &self,
+        (contacts, groups): (&[Contact], &[&ContactGroup]),
+        (plan, interior, solid): (&MeshScanPlan, Interior, &MeshSolid),
+        whole: &Penetration,
+        told: &mut dyn FnMut(f64),
+    ) -> Vec<Penetration> {
+        let (scan, mesh) = (self.scan(), self.mesh());
+        let parted_scan = PartedScan { scan, interior, stored: stored_of(scan, contacts, 0) };
+        let parted_mesh =
+            PartedMesh::new(mesh, solid, || contacts.iter().map(|contact| contact.sources[1].0));
+        let first = (0.5 * default_link([scan; 2])).max(plan.reach());
+        let knows_parts = plan.options().metric != Some(Metric::Geodesic);
+        each(groups, told, Scratch::default, |group, scratch| {
+            let of = (whole, group.contacts.len() == contacts.len());
+            depth(&group.bounds, of, (first, self.budget()), |bounds| {
+                if !knows_parts {
+                    return OfParts::Whole;
+                }
+                let of_scan = parted_scan.part(group, bounds);
+                let of_mesh = parted_mesh.part(group, bounds);
+                if matches!((&of_scan, &of_mesh), (ScanPart::Whole, MeshPart::Whole)) {
+                    return OfParts::Whole;
+                }
+                let (Some(part), Some(piece)) = (of_scan.of(scan), of_mesh.of(&parted_mesh)) else {
+                    return OfParts::Unknown;
+                };
+                let Scratch { contact, solid: shapes, penetration: own, .. } = &mut *scratch;
+                let (pieces, working) =
+                    ((Piece { part, whole: *scan }, piece), (contact, &mut shapes.crossings));
+                OfParts::Found(of_pieces(pieces, interior, (plan, self.budget()), working, own))
+            })
+        })
+    }
+}

@@ -1,0 +1,199 @@
+//! Depths of clashes of two meshes, and of a scan and a mesh, against known ones.
+
+use nearmiss_geometry::{PointCloud, Pose, TriangleMesh};
+use nearmiss_hierarchy::{BuildOptions, MeshBuildOptions, MeshHierarchy, PointHierarchy};
+use nearmiss_query::{
+    Budget, CollideOptions, Contact, ContactGroup, Contacts, Interior, MeshPair, MeshScanPair, MeshScanPlan,
+    MeshScratch, MeshSolid, Penetration, Placed, PlacedMesh, Scratch, default_link, default_mesh_link,
+};
+use nearmiss_testdata::shapes::{Form, Order, Sampling, cuboid, patch, sphere};
+
+/// The spacing of points and the length of edges.
+const SPACING: f64 = 0.03;
+
+type Scene = [(Form, Pose)];
+
+/// The forms at their poses as one mesh.
+fn mesh(forms: &Scene) -> (MeshHierarchy, MeshSolid) {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for (form, pose) in forms {
+        let own = form.clone().tessellated(2.0 * SPACING);
+        let first = u32::try_from(vertices.len()).unwrap();
+        // Corners on both sides of a seam are the same but for rounding.
+        vertices
+            .extend(own.vertices().iter().map(|&p| pose.apply(p).map(|x| (x * 1e9).round() * 1e-9 + 0.0)));
+        triangles.extend(own.triangles().iter().map(|t| t.map(|v| v + first)));
+    }
+    let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+    let prepared = MeshHierarchy::build(&mesh, &MeshBuildOptions::default()).unwrap();
+    let solid = MeshSolid::new(&prepared);
+    (prepared, solid)
+}
+
+/// The forms at their poses as one scan.
+fn scan(forms: &Scene) -> PointHierarchy {
+    let sampling = Sampling { spacing: SPACING, noise: 0.0, order: Order::Random, seed: 3 };
+    let points: Vec<[f64; 3]> = forms
+        .iter()
+        .flat_map(|(form, pose)| {
+            let points = form.clone().sample(sampling).points;
+            points.into_iter().map(|p| pose.apply(p)).collect::<Vec<_>>()
+        })
+        .collect();
+    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+/// Balls of this radius in a row along x, `apart` from each other, sunk to these depths below z = `top`.
+fn row(radius: f64, apart: f64, top: f64, depths: &[f64]) -> Vec<(Form, Pose)> {
+    let middle = 0.5 * (depths.len() as f64 - 1.0);
+    let x = (0_u32..).map(|i| apart * (f64::from(i) - middle));
+    let place = |(x, depth): (f64, &f64)| Pose::from_translation([x, 0.0, top + radius - depth]);
+    x.zip(depths).map(place).map(|pose| (sphere(radius), pose)).collect()
+}
+
+/// The clashes of a pair, in the order of their centres along x.
+fn in_order(contacts: &[Contact], link: f64) -> Vec<ContactGroup> {
+    let mut groups = ContactGroup::all(contacts, link);
+    groups.sort_by(|p, q| p.centre()[0].total_cmp(&q.centre()[0]));
+    groups
+}
+
+/// The clashes of two meshes and their depths.
+fn of_meshes(pair: &MeshPair<'_>, solids: [&MeshSolid; 2]) -> (Vec<ContactGroup>, Vec<Penetration>) {
+    let (mut contacts, scratch) = (Vec::new(), &mut MeshScratch::default());
+    assert!(pair.contacts(&mut contacts, scratch).1);
+    let places: Vec<Contact> = contacts.iter().map(Contact::from).collect();
+    let groups = in_order(&places, default_mesh_link(&contacts));
+    let whole = pair.penetration(solids, scratch);
+    let (asked, mut told) = (groups.iter().collect::<Vec<_>>(), Vec::new());
+    let found = pair.depths((&contacts, &asked), solids, &whole, &mut |share| told.push(share));
+    assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
+    assert!(found.iter().all(|depth| depth.lower <= depth.upper && depth.upper <= whole.upper), "{whole:?}");
+    (groups, found)
+}
+
+/// Balls in a floor, which is open, and in the top of a block, which is solid.
+#[test]
+fn each_clash_of_meshes_has_the_depth_of_its_own_place() {
+    let depths = [0.02, 0.05, 0.1, 0.15, 0.25, 0.3];
+    for (turn, scale) in [(0.0, 1.0), (0.7, 20.0)] {
+        let pose = Pose::from_axis_angle([0.0, 0.0, turn], turn).with_scale(scale);
+        for (below, top, apart) in [
+            ((patch(14.0, 2.0), Pose::IDENTITY), 0.0, 2.0),
+            ((patch(14.0, 2.0), Pose::IDENTITY), 0.0, 0.85),
+            ((cuboid([14.0, 2.0, 1.0]), Pose::from_translation([0.0, 0.0, -0.5])), 0.0, 2.0),
+        ] {
+            let (a, solid_a) = mesh(&[below]);
+            let (b, solid_b) = mesh(&row(0.3, apart, top, &depths));
+            let (a, b) = (PlacedMesh::new(&a, &pose), PlacedMesh::new(&b, &pose));
+            let pair = MeshPair::new(a, b);
+            let solids = [&solid_a, &solid_b];
+            let (groups, found) = of_meshes(&pair, solids);
+            assert_eq!(found.len(), depths.len());
+            for ((found, exact), group) in found.iter().zip(depths).zip(&groups) {
+                // Balls of flat triangles are a little less deep.
+                assert!((found.upper / scale - exact).abs() < 0.006, "{exact}: {found:?}");
+                assert!(found.direction[2] > 0.9 || scale > 1.0, "{exact}: {found:?}");
+                let is_solid = solid_a.is_closed();
+                assert!(!is_solid || found.lower > 0.9 * found.upper, "{exact}: {found:?}");
+                // After the shift nothing meets there.
+                let [x, y, z] = pose.translation();
+                let by = found.direction.map(|u| u * found.upper * (1.0 + 1e-9));
+                let moved = pose.with_translation([x + by[0], y + by[1], z + by[2]]);
+                let mut left = Vec::new();
+                let shifted = MeshPair::new(a, PlacedMesh::new(b.mesh(), &moved));
+                shifted.contacts(&mut left, &mut MeshScratch::default());
+                let near = group.bounds.grown(0.5 * exact * scale);
+                assert!(left.iter().all(|contact| !near.contains(contact.point)), "{exact}: {found:?}");
+            }
+        }
+    }
+}
+
+/// What leaves one surface of a solid must leave the solid; what passes through a wall leaves it as a whole;
+/// triangles may be much larger than the clash.
+#[test]
+fn clashes_of_meshes_with_cavities_pipes_and_large_triangles() {
+    // A ball in a cavity of a block.
+    let (block, solid) = mesh(&[(cuboid([3.0; 3]), Pose::IDENTITY), (sphere(0.5), Pose::IDENTITY)]);
+    let (ball, own) = mesh(&[(sphere(0.45), Pose::IDENTITY)]);
+    let at = Pose::from_translation([0.1, 0.0, 0.0]);
+    let pair = MeshPair::new(PlacedMesh::new(&block, &Pose::IDENTITY), PlacedMesh::new(&ball, &at));
+    let (_, found) = of_meshes(&pair, [&solid, &own]);
+    for depth in &found {
+        assert!((depth.upper - 0.05).abs() < 0.005, "back into the cavity: {depth:?}");
+    }
+    let (large, own) = mesh(&[(sphere(0.6), Pose::IDENTITY)]);
+    let pair = MeshPair::new(PlacedMesh::new(&block, &Pose::IDENTITY), PlacedMesh::new(&large, &at));
+    let whole = pair.penetration([&solid, &own], &mut MeshScratch::default());
+    assert!(whole.upper > 1.9, "out of the block: {whole:?}");
+
+    // A pipe through a wall leaves it sideways; one that ends in it leaves it along its axis.
+    let wall = TriangleMesh::new(
+        vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
+        vec![[0, 1, 2], [0, 2, 3]],
+    )
+    .unwrap();
+    let wall = MeshHierarchy::build(&wall, &MeshBuildOptions::default()).unwrap();
+    let open = MeshSolid::new(&wall);
+    let pipe = |x: f64, z: f64| (cuboid([0.2, 0.2, 1.6]), Pose::from_translation([x, 0.0, z]));
+    let (pipes, own) = mesh(&[pipe(-0.5, 0.1), pipe(0.5, 0.75)]);
+    let pair =
+        MeshPair::new(PlacedMesh::new(&wall, &Pose::IDENTITY), PlacedMesh::new(&pipes, &Pose::IDENTITY));
+    let (_, found) = of_meshes(&pair, [&open, &own]);
+    let [through, ends] = found[..] else { panic!("{found:?}") };
+    assert!((through.upper - 0.6).abs() < 0.01 && through.direction[0] < -0.99, "{through:?}");
+    assert!((ends.upper - 0.05).abs() < 1e-3 && ends.direction[2] > 0.99, "{ends:?}");
+}
+
+/// A scan against a mesh, each of which has the balls.
+#[test]
+fn each_clash_of_a_scan_and_a_mesh_has_the_depth_of_its_own_place() {
+    let depths = [0.03, 0.1, 0.2, 0.3];
+    let scratch = &mut Scratch::default();
+    let floor = [(patch(9.0, 2.0), Pose::IDENTITY)];
+    let block = [(cuboid([9.0, 2.0, 1.0]), Pose::from_translation([0.0, 0.0, -0.5]))];
+    let balls = row(0.3, 2.0, 0.0, &depths);
+    let (hollow, solid) = (Interior::Hollow, Interior::Solid);
+    for (of_scan, of_mesh, interior, up) in [
+        (&floor[..], &balls[..], hollow, 1.0),
+        (&block[..], &balls[..], solid, 1.0),
+        (&balls[..], &floor[..], solid, -1.0),
+        (&balls[..], &block[..], hollow, -1.0),
+    ] {
+        let (a, (b, own)) = (scan(of_scan), mesh(of_mesh));
+        for scale in [1.0, 20.0] {
+            let pose = Pose::IDENTITY.with_scale(scale);
+            let (a, b) = (Placed::new(&a, &pose), PlacedMesh::new(&b, &pose));
+            let radius = a.sampling_radius() / scale;
+            let pair = MeshScanPair::new(a, b);
+            let plan = MeshScanPlan::new(&CollideOptions::estimated(), a.scan()).unwrap();
+            let mut contacts = Contacts::default();
+            pair.contacts(&plan, &mut contacts, scratch);
+            let groups = in_order(&contacts.contacts, default_link([&a; 2]));
+            let groups: Vec<&ContactGroup> = groups.iter().collect();
+            let whole = pair.penetration(&plan, (interior, &own), scratch);
+            let asked = (contacts.contacts.as_slice(), groups.as_slice());
+            let of = (&plan, interior, &own);
+            let found = pair.depths(asked, of, &whole, &mut |_| ());
+            assert_eq!(found.len(), depths.len(), "{found:?}");
+            for (found, exact) in found.iter().zip(depths) {
+                assert!((found.upper / scale - exact).abs() < radius, "{exact}: {found:?}");
+                assert!(found.direction[2] * up > 0.9, "{exact}: {found:?}");
+                assert!(found.lower <= found.upper, "{found:?}");
+                if interior == solid && own.is_closed() {
+                    assert!(found.lower / scale > exact - 1.5 * radius, "{exact}: {found:?}");
+                }
+            }
+            // A budget may end the search; what is told holds.
+            for work in [1, 300, 3000] {
+                let hasty = pair.within(&Budget::UNLIMITED.with_work(work));
+                let whole = hasty.penetration(&plan, (interior, &own), scratch);
+                for (found, exact) in hasty.depths(asked, of, &whole, &mut |_| ()).iter().zip(depths) {
+                    assert!(found.lower / scale < exact + radius, "{work}: {found:?}");
+                    assert!(found.upper / scale > exact - radius, "{work}: {found:?}");
+                }
+            }
+        }
+    }
+}
