@@ -128,6 +128,17 @@ fn clashes_of_meshes_with_cavities_pipes_and_large_triangles() {
     let whole = pair.penetration([&solid, &own], &mut MeshScratch::default());
     assert!(whole.upper > 1.9, "out of the block: {whole:?}");
 
+    // A ball in the wall of a box, off its middle, meets the inner faces only. The outer ones are in the way.
+    let (shell, solid) = mesh(&[(cuboid([12.0; 3]), Pose::IDENTITY), (cuboid([10.0; 3]), Pose::IDENTITY)]);
+    let (ball, own) = mesh(&[(sphere(0.9), Pose::IDENTITY)]);
+    for turn in 0..4_u8 {
+        let at = Pose::from_axis_angle([0.0, 0.0, 1.0], f64::from(turn)).with_translation([5.05, 0.0, 0.0]);
+        let pair = MeshPair::new(PlacedMesh::new(&shell, &Pose::IDENTITY), PlacedMesh::new(&ball, &at));
+        let (_, found) = of_meshes(&pair, [&solid, &own]);
+        let [depth] = found[..] else { panic!("{found:?}") };
+        assert!((depth.upper - 0.95).abs() < 0.005 && depth.direction[0] < -0.99, "{turn}: {depth:?}");
+    }
+
     // A pipe through a wall leaves it sideways; one that ends in it leaves it along its axis.
     let wall = TriangleMesh::new(
         vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
@@ -144,6 +155,39 @@ fn clashes_of_meshes_with_cavities_pipes_and_large_triangles() {
     let [through, ends] = found[..] else { panic!("{found:?}") };
     assert!((through.upper - 0.6).abs() < 0.01 && through.direction[0] < -0.99, "{through:?}");
     assert!((ends.upper - 0.05).abs() < 1e-3 && ends.direction[2] > 0.99, "{ends:?}");
+}
+
+/// Fins, which are open, in a floor, close to each other: another one is no piece of a clash.
+#[test]
+fn clashes_of_open_meshes_count_linked_triangles() {
+    let depths = [0.02, 0.1, 0.05, 0.14];
+    let upright = Pose::from_axis_angle([0.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2);
+    let fin = |(i, depth): (u32, f64)| {
+        (patch(0.3, 0.3), upright.with_translation([0.1 * f64::from(i), 0.0, 0.15 - depth]))
+    };
+    let (floor, open) = mesh(&[(patch(4.0, 4.0), Pose::IDENTITY)]);
+    let (fins, own) = mesh(&(0..).zip(depths).map(fin).collect::<Vec<_>>());
+    assert!(!own.is_closed() && own != open);
+    let pair =
+        MeshPair::new(PlacedMesh::new(&floor, &Pose::IDENTITY), PlacedMesh::new(&fins, &Pose::IDENTITY));
+    let whole = pair.penetration([&open, &own], &mut MeshScratch::default());
+    assert!((whole.upper - 0.14).abs() < 1e-3, "{whole:?}");
+    let mut contacts = Vec::new();
+    pair.contacts(&mut contacts, &mut MeshScratch::default());
+    // One group for each fin, however long the segments are.
+    let on_axis = |contact: Contact| Contact { point: [contact.point[0], 0.0, 0.0], ..contact };
+    let places: Vec<Contact> = contacts.iter().map(|contact| on_axis(contact.into())).collect();
+    let groups = in_order(&places, 0.05);
+    let groups: Vec<&ContactGroup> = groups.iter().collect();
+    let found = pair.depths((&contacts, &groups), [&open, &own], &whole, &mut |_| ());
+    assert_eq!(found.len(), depths.len());
+    for (found, exact) in found.iter().zip(depths) {
+        assert!((found.upper - exact).abs() < 1e-3 && found.direction[2] > 0.99, "{exact}: {found:?}");
+    }
+    // Groups may be the caller's own.
+    let strange = ContactGroup { contacts: vec![usize::MAX], ..groups[0].clone() };
+    let odd = pair.depths((&contacts, &[&strange]), [&open, &own], &whole, &mut |_| ());
+    assert!((odd[0].upper - whole.upper).abs() < 1e-9, "{odd:?}");
 }
 
 /// A scan against a mesh, each of which has the balls.
