@@ -372,6 +372,9 @@ record! {
         size: [f64; 3] = "3f8",
         lower: f64 = "f8",
         upper: f64 = "f8",
+        depth: f64 = "f8",
+        depth_lower: f64 = "f8",
+        depth_direction: [f64; 3] = "3f8",
         point: [f64; 3] = "3f8",
         residual: f64 = "f8",
         source_a: i64 = "i8",
@@ -388,11 +391,15 @@ impl ClashRecord {
     /// `contacts` are those of all clashes.
     pub(crate) fn new(clash: &nearmiss::Clash, contacts: &[nearmiss::Contact]) -> Self {
         let best = ContactRecord::new(&contacts[clash.group.nearest]);
+        let depth = clash.depth.filter(|depth| depth.upper.is_finite());
         Self {
             centre: clash.group.centre(),
             size: clash.group.size(),
             lower: clash.lower,
             upper: clash.upper,
+            depth: depth.map_or(NONE, |depth| depth.upper),
+            depth_lower: depth.map_or(NONE, |depth| depth.lower),
+            depth_direction: depth.map_or(NOWHERE, |depth| depth.direction),
             point: best.point,
             residual: best.residual,
             source_a: best.source_a,

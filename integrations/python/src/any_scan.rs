@@ -14,7 +14,7 @@ use crate::failure::refused;
 use crate::frame::Frame;
 use crate::hint::Hint;
 use crate::options::{OF_MEANING, OF_SCANS, OF_SHAPES, Options};
-use crate::pair::{Apart, Contact, Overlap, Question, pair_of};
+use crate::pair::{Apart, Contact, Overlap, Question, interiors, pair_of};
 use crate::pool::ask;
 use crate::poses::{Poses, both};
 use crate::record::array;
@@ -282,15 +282,20 @@ impl AnyScan {
     }
 
     /// List the places where this scan, at `own_pose`, touches `other`, at `pose`, or comes nearer than
-    /// `clearance`: groups of contacts that are at most `link` apart.
+    /// `clearance`: groups of contacts that are at most `link` apart. With `depth`, hard clashes tell how
+    /// far `other` must move out of each. `solid` names the scans whose surface encloses a solid, "a" for
+    /// this scan, "b" for `other`, or "both", and asks for depths as well.
     ///
     /// Returns a structured array of shape (N,), the hard clashes first, then the greatest ones. Its
     /// fields are `hard` (false if they only come nearer than the clearance), `centre` and `size` of the
-    /// box about the contacts, `lower` and `upper` (bounds of the least distance), `evidence`,
-    /// `contacts` and `surroundings` (their numbers), and of the best contact `point`, `residual`,
+    /// box about the contacts, `lower` and `upper` (bounds of the least distance), `depth` (the length of a
+    /// move of `other` out of the clash, along `depth_direction`), `depth_lower` (no shorter move does;
+    /// all three are NaN where no depth is known), `evidence`, `contacts` and `surroundings` (their numbers), and of the best contact `point`, `residual`,
     /// `source_a` and `source_b`. Options: `thickened` and `surface_only`. Warns if the clearance is so
     /// great that the search ended early.
-    #[pyo3(signature = (other, pose = None, own_pose = None, *, clearance = 0.0, link = None, **options))]
+    #[pyo3(signature = (
+        other, pose = None, own_pose = None, *, clearance = 0.0, link = None, depth = false, solid = None, **options
+    ))]
     #[expect(clippy::too_many_arguments, reason = "names in Python")]
     fn clashes<'py>(
         &self,
@@ -299,6 +304,8 @@ impl AnyScan {
         own_pose: Option<&Bound<'py, PyAny>>,
         clearance: f64,
         link: Option<f64>,
+        depth: bool,
+        solid: Option<&str>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (py, scans) = (other.py(), self.scans(other));
@@ -306,6 +313,8 @@ impl AnyScan {
         let asked =
             ClashOptions::default().with_clearance(clearance).with_semantics(options.collide.semantics);
         let asked = link.map_or(asked, |link| asked.with_link(link));
+        let insides = interiors(solid, [true; 2])?;
+        let asked = if depth || solid.is_some() { asked.with_depths(insides) } else { asked };
         let plan = ClashPlan::new(&asked, &scans[0], &scans[1]).map_err(refused)?;
         let poses = poses_of(&scans, [own_pose, pose])?;
         let found = ask(py, |scratch| pair_of(&scans, &poses).clashes(&plan, scratch));

@@ -124,6 +124,19 @@ class Clashes(unittest.TestCase):
         self.assertEqual(curve.shape[1], 3)
         self.assertLess(np.abs(curve[:, 1:] - [0.505, 0.0]).max(), 1e-3)
         self.assertGreater(np.ptp(curve[:, 0]), 0.9)
+        self.assertTrue(np.isnan(clash["depth"]) and np.isnan(clash["depth_direction"]).all())
+
+    def test_hard_clashes_tell_their_depth(self):
+        scan = nearmiss.Scan(plate())
+        upright = np.array([[1, 0, 0, 0.005], [0, 0, -1, 0.505], [0, 1, 0, -0.1], [0, 0, 0, 1.0]])
+        (clash,) = scan.clashes(scan, upright, depth=True)
+        self.assertTrue(0.08 < clash["depth"] < 0.13, clash)
+        self.assertGreater(clash["depth_direction"][2], 0.9)
+        self.assertEqual(clash["depth_lower"], 0.0)
+        (solid,) = scan.clashes(scan, upright, solid="both")
+        self.assertLessEqual(solid["depth_lower"], solid["depth"])
+        with self.assertRaisesRegex(ValueError, "solid"):
+            scan.clashes(scan, upright, solid="c")
 
     def test_near_places_are_listed_with_their_distance(self):
         scan = nearmiss.Scan(plate())

@@ -265,7 +265,17 @@ fn all_contacts_of_meshes_form_closed_curves() {
     let outline = 2.0 * (1.7 + 1.8) + 2.0 * 0.5;
     assert!((length - outline).abs() < 1e-9, "{length} instead of {outline}");
     assert_eq!(told["clashes"].as_array().unwrap().len(), 1, "{told}");
-    assert_eq!(keys(&told["clashes"][0]), sorted("contacts centre size bounds depth point triangles"));
+    let of_clash = "contacts centre size bounds depth depth_lower depth_direction point triangles";
+    assert_eq!(keys(&told["clashes"][0]), sorted(of_clash));
+    assert!(told["clashes"][0]["depth"].is_null(), "{told}");
+    // They overlap by 0.5 along x, and by more along y and z.
+    let deep = place.ok(&[&asked[..], &["--penetration", "--json"]].concat()).json().remove(0);
+    let clash = &deep["clashes"][0];
+    let (depth, lower) = (clash["depth"].as_f64().unwrap(), clash["depth_lower"].as_f64().unwrap());
+    assert!((depth - 0.5).abs() < 1e-5 && lower > 0.4 && lower <= depth, "{clash}");
+    assert!(numbers(&clash["depth_direction"])[0] > 0.999, "{clash}");
+    let people = place.ok(&[&asked[..], &["--penetration"]].concat()).results;
+    assert!(people.contains(" 0.5 deep"), "{people}");
     let table = std::fs::read_to_string(place.path("c.csv")).unwrap();
     assert_eq!(table.lines().count(), contacts.len() + 1);
     assert!(table.starts_with("clash,x,y,z,normal_a_x,") && table.contains("to_z,triangle_a,triangle_b\n"));

@@ -283,6 +283,8 @@ class AnyScan:
         *,
         clearance: SupportsFloat = 0.0,
         link: SupportsFloat | None = None,
+        depth: bool = False,
+        solid: str | None = None,
         **options: Unpack[_MeaningOptions],
     ) -> _Records: ...
     def curves(
