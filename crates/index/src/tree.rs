@@ -31,7 +31,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_lanes::parallel::change_each;
-use nearmiss_lanes::wide::{WIDTH, greatest, lanes_of, least, squared};
+use nearmiss_lanes::wide::{WIDTH, greatest_of_each, lanes_of, least_of_each, squared};
 use nearmiss_store::{Room, WorkError, Workspace};
 
 use crate::block::PointBlock;
@@ -56,22 +56,52 @@ impl Boxes {
         support_radius: [0.0; WIDTH],
     };
 
-    /// Returns the boxes of a group. `count` is the number of boxes of the level.
+    /// Returns the boxes of up to sixteen blocks, the last of which has `last` points.
     #[inline(always)]
-    fn of(group: usize, count: usize, bounds: impl Fn(usize) -> Bounds) -> Self {
-        let mut boxes = Self::EMPTY;
-        for (lane, i) in (group * WIDTH..count.min(group * WIDTH + WIDTH)).enumerate() {
-            boxes.set(lane, &bounds(i));
+    fn of_blocks<S: Simd>(simd: S, blocks: &[PointBlock], last: usize) -> Self {
+        let [most, none, zero] = neutral(simd);
+        let mut used = [mask32x16::from_bitmask(simd, 0); WIDTH];
+        for (i, used) in used.iter_mut().enumerate().take(blocks.len()) {
+            let count = if i + 1 < blocks.len() { WIDTH } else { last };
+            *used = mask32x16::from_bitmask(simd, u64::from(lanes_of(0, &(0..count))));
         }
+        let mut boxes = Self::EMPTY;
+        for k in 0..3 {
+            let (mut low, mut high) = ([most; WIDTH], [none; WIDTH]);
+            for (i, block) in blocks.iter().enumerate().take(WIDTH) {
+                let row = f32x16::load_array_ref(simd, &block.position[k]);
+                low[i] = simd.select_f32x16(used[i], row, most);
+                high[i] = simd.select_f32x16(used[i], row, none);
+            }
+            (boxes.min[k], boxes.max[k]) = (least_of_each(low), greatest_of_each(high));
+        }
+        let mut radii = [zero; WIDTH];
+        for (i, block) in blocks.iter().enumerate().take(WIDTH) {
+            radii[i] = simd.select_f32x16(used[i], f32x16::load_array_ref(simd, &block.support_radius), zero);
+        }
+        boxes.support_radius = greatest_of_each(radii);
         boxes
     }
 
-    fn set(&mut self, lane: usize, bounds: &Bounds) {
+    /// Returns the boxes around up to sixteen groups of boxes.
+    #[inline(always)]
+    fn of_groups<S: Simd>(simd: S, groups: &[Self]) -> Self {
+        let [most, none, zero] = neutral(simd);
+        let mut boxes = Self::EMPTY;
         for k in 0..3 {
-            self.min[k][lane] = bounds.min[k];
-            self.max[k][lane] = bounds.max[k];
+            let (mut low, mut high) = ([most; WIDTH], [none; WIDTH]);
+            for (i, group) in groups.iter().enumerate().take(WIDTH) {
+                low[i] = f32x16::load_array_ref(simd, &group.min[k]);
+                high[i] = f32x16::load_array_ref(simd, &group.max[k]);
+            }
+            (boxes.min[k], boxes.max[k]) = (least_of_each(low), greatest_of_each(high));
         }
-        self.support_radius[lane] = bounds.support_radius;
+        let mut radii = [zero; WIDTH];
+        for (i, group) in groups.iter().enumerate().take(WIDTH) {
+            radii[i] = f32x16::load_array_ref(simd, &group.support_radius);
+        }
+        boxes.support_radius = greatest_of_each(radii);
+        boxes
     }
 
     #[inline(always)]
@@ -105,40 +135,6 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// Returns the box of the first `count` points of a block; of all if there are fewer.
-    #[inline(always)]
-    fn of_block<S: Simd>(simd: S, block: &PointBlock, count: usize) -> Self {
-        let used = lanes_of(0, &(0..count));
-        Self::of(simd, used, (&block.position, &block.position), &block.support_radius)
-    }
-
-    /// Returns the box of all boxes of a group.
-    #[inline(always)]
-    fn of_group<S: Simd>(simd: S, group: &Boxes) -> Self {
-        Self::of(simd, lanes_of(0, &(0..WIDTH)), (&group.min, &group.max), &group.support_radius)
-    }
-
-    /// Returns the box of the boxes in the lanes `used`.
-    #[inline(always)]
-    fn of<S: Simd>(
-        simd: S,
-        used: u32,
-        (min, max): (&[[f32; WIDTH]; 3], &[[f32; WIDTH]; 3]),
-        support_radii: &[f32; WIDTH],
-    ) -> Self {
-        let used = mask32x16::from_bitmask(simd, u64::from(used));
-        let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
-        let mut bounds = Self { min: [0.0; 3], max: [0.0; 3], support_radius: 0.0 };
-        for k in 0..3 {
-            let (min, max) = (f32x16::load_array_ref(simd, &min[k]), f32x16::load_array_ref(simd, &max[k]));
-            bounds.min[k] = least(simd.select_f32x16(used, min, most), f32::INFINITY);
-            bounds.max[k] = greatest(simd.select_f32x16(used, max, none), f32::NEG_INFINITY);
-        }
-        let radii = f32x16::load_array_ref(simd, support_radii);
-        bounds.support_radius = greatest(simd.select_f32x16(used, radii, f32x16::splat(simd, 0.0)), 0.0);
-        bounds
-    }
-
     /// Returns the squared distances of points from this box.
     #[inline(always)]
     fn distances_sq<S: Simd>(&self, simd: S, points: &[f32x16<S>; 3]) -> f32x16<S> {
@@ -152,15 +148,28 @@ impl Bounds {
     }
 }
 
+/// Returns what is neutral in minima, in maxima, and in maxima of lengths.
+#[inline(always)]
+fn neutral<S: Simd>(simd: S) -> [f32x16<S>; 3] {
+    [f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY), f32x16::splat(simd, 0.0)]
+}
+
 /// The boxes of a tree over blocks of points. They do not hold the points, and take slightly more
 /// than a sixteenth of their memory.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct BlockBoxes {
     /// The number of points.
     points: usize,
     /// The box of block `i` is in lane `i` % 16 of group `i` / 16 of the first level. Each further
     /// level holds the boxes of the groups below in the same way. The last level has one group.
     levels: Vec<Room<Boxes>>,
+}
+
+impl Clone for BlockBoxes {
+    /// A copy in memory.
+    fn clone(&self) -> Self {
+        Self { points: self.points, levels: self.levels.iter().map(|level| level.to_vec().into()).collect() }
+    }
 }
 
 impl BlockBoxes {
@@ -187,34 +196,62 @@ impl BlockBoxes {
         Self::with(blocks, points, |groups| work.room(groups))
     }
 
+    /// Computes the boxes anew from other `blocks`, as [`Self::new`] does, in the same memory if they are as
+    /// many as before.
+    ///
+    /// # Panics
+    /// As [`Self::new`].
+    pub fn renew(&mut self, blocks: &[PointBlock], points: usize) {
+        if points == self.points && !self.levels.is_empty() {
+            self.fill(blocks);
+        } else {
+            *self = Self::new(blocks, points);
+        }
+    }
+
     fn with<E>(
         blocks: &[PointBlock],
         points: usize,
         room: impl Fn(usize) -> Result<Room<Boxes>, E>,
     ) -> Result<Self, E> {
-        assert_eq!(blocks.len(), points.div_ceil(WIDTH), "expected the blocks of {points} points");
         assert!(points < u32::MAX as usize, "expected fewer than 2^32 - 1 points, got {points}");
-        let level = Level::new();
-        let mut first = room(blocks.len().div_ceil(WIDTH))?;
-        change_each(&mut first, WIDTH, |group, boxes| {
+        let mut levels = vec![room(blocks.len().div_ceil(WIDTH))?];
+        while let Some(below) = levels.last().filter(|level| level.len() > 1) {
+            levels.push(room(below.len().div_ceil(WIDTH))?);
+        }
+        let mut boxes = Self { points, levels };
+        boxes.fill(blocks);
+        Ok(boxes)
+    }
+
+    /// Computes all boxes from `blocks`.
+    fn fill(&mut self, blocks: &[PointBlock]) {
+        let points = self.points;
+        assert_eq!(blocks.len(), points.div_ceil(WIDTH), "expected the blocks of {points} points");
+        let (level, last) = (Level::new(), points - blocks.len().saturating_sub(1) * WIDTH);
+        let part = |group: usize, count: usize| group * WIDTH..count.min(group * WIDTH + WIDTH);
+        let (first, above) = self.levels.split_at_mut(1);
+        change_each(&mut first[0], WIDTH, |group, boxes| {
+            let part = part(group, blocks.len());
+            let last = if part.end == blocks.len() { last } else { WIDTH };
+            let blocks = &blocks[part];
             *boxes = dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || Boxes::of(group, blocks.len(), |i| Bounds::of_block(simd, &blocks[i], points - i * WIDTH)),
+                || Boxes::of_blocks(simd, blocks, last),
             ));
         });
-        let mut levels = vec![first];
-        while let Some(below) = levels.last().filter(|level| level.len() > 1) {
-            let mut above = room(below.len().div_ceil(WIDTH))?;
-            let below: &[Boxes] = below;
-            change_each(&mut above, WIDTH, |group, boxes| {
+        let mut below = &first[0];
+        for above in above {
+            let groups: &[Boxes] = below;
+            change_each(above, WIDTH, |group, boxes| {
+                let groups = &groups[part(group, groups.len())];
                 *boxes = dispatch!(level, simd => simd.vectorize(
                     #[inline(always)]
-                    || Boxes::of(group, below.len(), |i| Bounds::of_group(simd, &below[i])),
+                    || Boxes::of_groups(simd, groups),
                 ));
             });
-            levels.push(above);
+            below = above;
         }
-        Ok(Self { points, levels })
     }
 
     /// Returns the tree over `blocks`, which must be the blocks that the boxes were computed from.
@@ -292,5 +329,46 @@ impl<'a> BlockTree<'a> {
     #[inline(always)]
     fn nodes(&self, level: usize) -> usize {
         if level == 0 { self.blocks.len() } else { self.levels[level - 1].len() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::{point_in, rng};
+
+    use super::*;
+
+    /// The boxes of all levels hold what is below them, whatever they held before.
+    #[test]
+    fn boxes_are_those_of_loops() {
+        let rng = &mut rng(1907);
+        let mut renewed = BlockBoxes::default();
+        for count in [0, 1, 15, 16, 17, 255, 256, 257, 5000, 5000, 4101, 4101] {
+            #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+            let points: Vec<[f32; 3]> = (0..count).map(|_| point_in(rng, 3.0).map(|x| x as f32)).collect();
+            let mut blocks: Vec<PointBlock> = PointBlock::without_support(&points).collect();
+            for (i, block) in blocks.iter_mut().enumerate() {
+                block.support_radius[i % WIDTH] = 0.25 + 0.5 * block.position[0][i % WIDTH].abs();
+            }
+            renewed.renew(&blocks, count);
+            for boxes in [&renewed, &renewed.clone(), &BlockBoxes::new(&blocks, count)] {
+                let tree = boxes.over(&blocks);
+                let (mut width, mut level) = (WIDTH, 0);
+                while level < tree.levels.len() {
+                    for id in 0..tree.nodes(level) {
+                        let range = id * width..count.min((id + 1) * width);
+                        let bounds = tree.bounds(level, id);
+                        for k in 0..3 {
+                            let along = || points[range.clone()].iter().map(|p| p[k]);
+                            assert_eq!(bounds.min[k], along().fold(f32::INFINITY, f32::min));
+                            assert_eq!(bounds.max[k], along().fold(f32::NEG_INFINITY, f32::max));
+                        }
+                        let radii = range.map(|i| blocks[i / WIDTH].support_radius[i % WIDTH]);
+                        assert_eq!(bounds.support_radius, radii.fold(0.0, f32::max));
+                    }
+                    (width, level) = (width * WIDTH, level + 1);
+                }
+            }
+        }
     }
 }

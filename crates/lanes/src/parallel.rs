@@ -30,17 +30,8 @@ pub fn map_all<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send)
 
 /// Maps consecutive chunks of items. For expensive `f`.
 pub fn chunks<T: Sync, R: Send>(items: &[T], f: impl Fn(&[T]) -> R + Sync + Send) -> Vec<R> {
-    chunks_with(items, || (), |(), items| f(items))
-}
-
-/// Like [`chunks`], with scratch memory as [`map_with`] has it.
-pub fn chunks_with<T: Sync, S, R: Send>(
-    items: &[T],
-    scratch: impl Fn() -> S + Sync + Send,
-    f: impl Fn(&mut S, &[T]) -> R + Sync + Send,
-) -> Vec<R> {
     const LENGTH: usize = 16;
-    ranges_with(items.len(), LENGTH, scratch, |scratch, range| f(scratch, &items[range]))
+    ranges_with(items.len(), LENGTH, || (), |(), range| f(&items[range]))
 }
 
 /// Maps each number below `count`. For expensive `f`: the numbers are scheduled one by one.

@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{chunks, chunks_with, collect_into, in_order};
+use nearmiss_lanes::parallel::{chunks, collect_into, in_order, ranges_with};
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
 use nearmiss_store::{Room, WorkError, Workspace};
@@ -165,7 +165,9 @@ pub(crate) fn fits_of(
     leaves: &[u32],
 ) -> Vec<Fit> {
     let level = Level::new();
-    let some = chunks_with(leaves, LeafScratch::default, |scratch, leaves| {
+    // Few leaves at once, as a thread may finish early if there are not many.
+    let some = ranges_with(leaves.len(), 4, LeafScratch::default, |scratch, some| {
+        let leaves = &leaves[some];
         let mut fits = Vec::with_capacity(leaves.len() * index.tree.topology.leaf_size());
         for number in leaves {
             let points = index.tree.topology.points_of_leaf(*number as usize);

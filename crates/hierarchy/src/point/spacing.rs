@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_index::{BlockTree, Nearest, PointBlock};
-use nearmiss_lanes::parallel::{change_both, chunks_with, collect_into, in_order};
+use nearmiss_lanes::parallel::{change_both, collect_into, in_order, ranges_with};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::symmetric_eigen;
 
@@ -141,10 +141,13 @@ pub(crate) fn spacings_of(
     radii: &[f32],
     blocks: &[u32],
 ) -> Vec<(Spacing, f32)> {
-    let some = chunks_with(
-        blocks,
+    // Few blocks at once, as a thread may finish early if there are not many.
+    let some = ranges_with(
+        blocks.len(),
+        4,
         || Search::new(tree, points),
-        |search, blocks| {
+        |search, some| {
+            let blocks = &blocks[some];
             let mut found = Vec::with_capacity(blocks.len() * WIDTH);
             for block in blocks {
                 let first = *block as usize * WIDTH;

@@ -4,6 +4,7 @@
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::{both, change_each, fill, runs};
+use nearmiss_lanes::wide::greatest_of;
 use nearmiss_store::Array;
 use nearmiss_surface::{EigenBlock, SurfacePlan};
 
@@ -90,7 +91,7 @@ impl Closing {
             },
             dense: meta.dense as usize,
         };
-        let greatest = arrays.radii.iter().copied().fold(0.0, f32::max);
+        let greatest = greatest_of(&arrays.radii);
         let beyond = 0.5 * plan.support_radius(greatest);
         let (bottoms, leaves) = (topology.first_bottom(), topology.inner());
         let (boxes, leaf_boxes) = boxes.split_at_mut(leaves);

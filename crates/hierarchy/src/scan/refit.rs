@@ -71,6 +71,8 @@ pub(crate) struct Memory {
     lanes: Vec<RestLanes>,
     /// The leaves to fit anew.
     changed: Vec<u32>,
+    /// The boxes of blocks, if some leaves are fitted anew.
+    boxes: BlockBoxes,
     pub(crate) closing: Closing,
 }
 
@@ -123,10 +125,12 @@ fn close(scan: &mut PointHierarchy, memory: &mut Memory, changed: &[u32]) -> usi
         memory.closing.support(scan);
     } else {
         let blocks = blocks_of_leaves(&scan.topology, changed);
-        let boxes = BlockBoxes::new(&scan.arrays.blocks, scan.len());
+        let mut boxes = std::mem::take(&mut memory.boxes);
+        boxes.renew(&scan.arrays.blocks, scan.len());
         let looks = space(scan, memory, &boxes, &blocks);
         memory.closing.support(scan);
         fit(scan, memory, (&boxes, &blocks), changed, &looks);
+        memory.boxes = boxes;
     }
     memory.closing.bound(scan);
     changed.iter().map(|leaf| scan.topology.points_of_leaf(*leaf as usize).len()).sum()
