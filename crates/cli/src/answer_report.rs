@@ -202,7 +202,7 @@ impl AnswerReport {
     /// Returns the report with the clashes into which the contacts are grouped.
     pub(crate) fn with_clashes(mut self, grouped: Option<&(&[Contact], Grouped)>) -> Self {
         if let Some((contacts, grouped)) = grouped {
-            self.link = Some(grouped.link);
+            self.link = grouped.link;
             self.clashes = Some(grouped.reports(contacts));
             for (contact, &clash) in self.contacts.iter_mut().flatten().zip(&grouped.numbers) {
                 contact.clash = clash;

@@ -100,7 +100,9 @@ impl Question {
         let all = contacts.as_ref().map(|all| all.contacts.as_slice());
         let grouped = all.map(|all| {
             let mut grouped = views.group(all, &args.contacts);
-            if let (Some(insides), Some(whole)) = (&self.insides, &asked.penetration) {
+            // Lines for people have no room for depths.
+            let is_told = args.json || asked.line.is_none();
+            if let (true, Some(insides), Some(whole)) = (is_told, &self.insides, &asked.penetration) {
                 let groups = (all, grouped.groups.as_slice());
                 grouped.depths = views.depths(&self.plan, insides, groups, whole, &self.budget_from(now()));
             }

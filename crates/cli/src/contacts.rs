@@ -22,8 +22,8 @@ pub(crate) const SHOWN: usize = 40;
 pub struct ContactArgs {
     /// Put contacts into one clash if they are at most this far apart, in world units
     ///
-    /// The default is four times the larger sampling radius; for meshes, the length of the longest
-    /// segment that two triangles have in common.
+    /// The default is four times the larger sampling radius; for two meshes, a clash is a connected curve
+    /// of intersection.
     #[arg(long, value_name = "LEN", requires = "all", allow_hyphen_values = true, value_parser = parse_radius)]
     pub link: Option<f64>,
     /// Write the contacts of --all as points, each with the normal of A and the number of its clash
@@ -77,7 +77,8 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
 /// Contacts grouped into clashes.
 #[derive(Debug)]
 pub(crate) struct Grouped {
-    pub(crate) link: f64,
+    /// The length up to which contacts are linked; `None` for connected curves.
+    pub(crate) link: Option<f64>,
     /// The clashes, the greatest first.
     pub(crate) groups: Vec<ContactGroup>,
     /// The number of the clash of each contact, counted from 1.
@@ -89,9 +90,14 @@ pub(crate) struct Grouped {
 impl Grouped {
     /// Groups `contacts` that are at most `link` apart, directly or through others.
     pub(crate) fn new(contacts: &[Contact], link: f64) -> Self {
-        let mut groups = ContactGroup::all(contacts, link);
+        Self::of(ContactGroup::all(contacts, link), Some(link))
+    }
+
+    /// Takes groups that hold all contacts.
+    pub(crate) fn of(mut groups: Vec<ContactGroup>, link: Option<f64>) -> Self {
         groups.sort_by(ContactGroup::by_size);
-        let numbers = numbers(contacts.len(), groups.iter().map(|group| &group.contacts));
+        let count = groups.iter().map(|group| group.contacts.len()).sum();
+        let numbers = numbers(count, groups.iter().map(|group| &group.contacts));
         Self { link, groups, numbers, depths: Vec::new() }
     }
 
@@ -103,11 +109,14 @@ impl Grouped {
 
     /// Returns the number of contacts and the clashes, for people.
     pub(crate) fn lines(&self, contacts: &[Contact], unit: f64) -> Vec<String> {
+        let linked = self.link.map_or_else(
+            || "a clash is a connected curve".to_owned(),
+            |link| format!("contacts up to {} apart are in one clash", rough(link)),
+        );
         let head = format!(
-            "{} in {} (contacts up to {} apart are in one clash)",
+            "{} in {} ({linked})",
             count(contacts.len() as u64, "contact"),
-            clash_count(self.groups.len()),
-            rough(self.link)
+            clash_count(self.groups.len())
         );
         let line = |(number, group): (usize, &ContactGroup)| {
             let [x, y, z] = group.size().map(short);

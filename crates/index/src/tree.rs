@@ -156,13 +156,20 @@ fn neutral<S: Simd>(simd: S) -> [f32x16<S>; 3] {
 
 /// The boxes of a tree over blocks of points. They do not hold the points, and take slightly more
 /// than a sixteenth of their memory.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct BlockBoxes {
     /// The number of points.
     points: usize,
     /// The box of block `i` is in lane `i` % 16 of group `i` / 16 of the first level. Each further
     /// level holds the boxes of the groups below in the same way. The last level has one group.
     levels: Vec<Room<Boxes>>,
+}
+
+impl Default for BlockBoxes {
+    /// The boxes of no points.
+    fn default() -> Self {
+        Self::new(&[], 0)
+    }
 }
 
 impl Clone for BlockBoxes {
@@ -202,7 +209,7 @@ impl BlockBoxes {
     /// # Panics
     /// As [`Self::new`].
     pub fn renew(&mut self, blocks: &[PointBlock], points: usize) {
-        if points == self.points && !self.levels.is_empty() {
+        if points == self.points {
             self.fill(blocks);
         } else {
             *self = Self::new(blocks, points);

@@ -14,6 +14,7 @@
 //! bounded from below by the enclosures of these leaves, or by the balls about their points.
 
 mod components;
+mod curves;
 mod depths;
 mod group;
 mod least;
@@ -30,7 +31,6 @@ pub use group::ContactGroup;
 
 use crate::ask::answer::{Answer, Contact, Contacts, Evidence};
 use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
-use crate::mesh::answer::MeshContact;
 use crate::pair::placed::Placed;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::question::{Pair, Scratch};
@@ -154,16 +154,6 @@ impl ClashPlan {
 #[must_use]
 pub fn default_link(views: [&Placed<'_>; 2]) -> f64 {
     LINK * views.map(Placed::sampling_radius).into_iter().fold(0.0, f64::max)
-}
-
-/// The default link length of contacts of meshes: that of the longest segment that two triangles have in common.
-/// On a curve of contacts, the middles of neighbouring segments are no further apart.
-#[must_use]
-pub fn default_mesh_link(contacts: &[MeshContact]) -> f64 {
-    let length = |[p, q]: [[f64; 3]; 2]| [0, 1, 2].map(|k| q[k] - p[k]).into_iter().fold(0.0, f64::hypot);
-    let longest = contacts.iter().map(|contact| length(contact.ends)).fold(0.0, f64::max);
-    // Rounding may move the middles apart.
-    longest * (1.0 + 1e-9)
 }
 
 /// The kinds of clashes.

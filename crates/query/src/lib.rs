@@ -28,7 +28,7 @@ pub use ask::interpolation::{Brackets, Interpolation, Refinement, SurfelSize};
 pub use ask::occupancy::{occupancy, points_for};
 pub use ask::options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};
 pub use clash::{Clash, ClashKind, ClashOptions, ClashPlan, Clashes, ContactGroup};
-pub use clash::{components, default_link, default_mesh_link};
+pub use clash::{components, default_link};
 pub use contact::certificate::Proof;
 pub use contact::hint::PairHint;
 pub use curve::{Curve, CurveEnd, CurveOptions, CurvePlan, Curves};

@@ -199,7 +199,9 @@ impl Question<'_> {
         let all = asked.contacts.as_ref();
         let grouped = all.map(|(all, complete)| {
             let mut all = MeshContacts::new(all, &self.args.contacts);
-            if let Some(whole) = &asked.penetration {
+            // Lines for people have no room for depths.
+            let is_told = self.args.json || asked.line.is_none();
+            if let Some(whole) = asked.penetration.as_ref().filter(|_| is_told) {
                 all.measure(&self.meshes.pair(&asked.poses, now()), self.solids(), whole);
             }
             (all, *complete)

@@ -3,7 +3,6 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use nearmiss::query::default_mesh_link;
 use nearmiss::{Contact, ContactGroup, MeshContact, MeshPair, MeshSolid, Penetration};
 use serde::Serialize;
 
@@ -21,11 +20,13 @@ pub(crate) struct MeshContacts<'a> {
 }
 
 impl<'a> MeshContacts<'a> {
-    /// Groups `contacts` by the link length of the options, or else by the default for these contacts.
+    /// Groups `contacts` by the link length of the options, or else by the curves on which they lie.
     pub(crate) fn new(contacts: &'a [MeshContact], args: &ContactArgs) -> Self {
-        let link = args.link.unwrap_or_else(|| default_mesh_link(contacts));
         let places: Vec<Contact> = contacts.iter().map(Contact::from).collect();
-        let grouped = Grouped::new(&places, link);
+        let grouped = match args.link {
+            Some(link) => Grouped::new(&places, link),
+            None => Grouped::of(ContactGroup::of_meshes(contacts), None),
+        };
         Self { contacts, places, grouped }
     }
 
@@ -35,9 +36,9 @@ impl<'a> MeshContacts<'a> {
         self.grouped.depths = pair.depths((self.contacts, &groups), solids, whole, &mut |_| ());
     }
 
-    /// Returns the length up to which contacts are linked.
+    /// Returns the length up to which contacts are linked; 0 for curves.
     pub(crate) fn link(&self) -> f64 {
-        self.grouped.link
+        self.grouped.link.unwrap_or(0.0)
     }
 
     /// Writes the requested files.

@@ -59,34 +59,45 @@ fn each<S>(
 }
 
 /// Bounds the depth of a clash whose things have this penetration. `of_parts` takes the bounding box of the
-/// contacts, grown to every side by a length that is first at least `first`. `is_only_one` if there is no
-/// other clash.
+/// contacts, grown to every side by a length that is first at least `first`.
 fn depth(
     bounds: &Aabb,
-    (whole, is_only_one): (&Penetration, bool),
+    whole: &Penetration,
     (first, budget): (f64, &Budget),
     mut of_parts: impl FnMut(&Aabb) -> OfParts,
 ) -> Penetration {
     let diagonal = 2.0 * bounds.half_extents().into_iter().fold(0.0, f64::hypot);
     let mut room = (FIRST * diagonal).max(first);
     let most = (ROOM * whole.upper).max(room);
-    // The shift of the whole things frees this clash too. Their lower bound holds for all clashes together.
-    let mut answer = Penetration { lower: if is_only_one { whole.lower } else { 0.0 }, ..*whole };
+    // The shift of the whole things frees this clash too. Their lower bound may be that of another place.
+    let mut answer = Penetration { lower: 0.0, ..*whole };
     if !most.is_finite() {
         return answer;
     }
     while budget.go_on(0).is_continue() {
         room = room.min(most);
         match of_parts(&bounds.grown(room)) {
-            OfParts::Whole => break,
+            OfParts::Whole => {
+                answer.lower = whole.lower;
+                break;
+            }
             OfParts::Unknown => {}
             OfParts::Found(found) => {
                 answer.lower = answer.lower.max(found.lower).min(answer.upper);
                 if found.upper <= whole.upper * NEARLY && ROOM * found.upper <= room {
-                    return found;
+                    // The bounds of smaller parts hold as well.
+                    return Penetration { lower: answer.lower.min(found.upper), ..found };
                 }
-                if found.upper > whole.upper * NEARLY || !found.complete {
+                if !found.complete {
                     break;
+                }
+                if found.upper > whole.upper * NEARLY {
+                    if room >= most || whole.lower <= answer.lower {
+                        break;
+                    }
+                    // The shift is known. The greatest parts may have a better lower bound.
+                    room = most;
+                    continue;
                 }
                 // A greater part needs a shift that is at least about as long.
                 room = room.max(0.5 * ROOM * found.upper);

@@ -6,6 +6,8 @@ use nearmiss_geometry::Aabb;
 
 use crate::ask::answer::Contact;
 use crate::clash::components::components;
+use crate::clash::curves::curves;
+use crate::mesh::answer::MeshContact;
 
 /// A connected component of contacts. Each contact is at most a link length from another one of the
 /// group, unless it is the only one.
@@ -26,15 +28,30 @@ impl ContactGroup {
     #[must_use]
     pub fn all(contacts: &[Contact], link: f64) -> Vec<Self> {
         let places: Vec<[f64; 3]> = contacts.iter().map(|contact| contact.point).collect();
+        Self::numbered(contacts, components(&places, link))
+    }
+
+    /// Groups contacts of meshes that lie on connected curves: each curve on which the surfaces intersect is a
+    /// group, however long the segments are of which it consists. Contacts of triangles in one plane are
+    /// grouped by the distances of their middles. The groups are in the order of their first contacts. n log n
+    /// steps.
+    #[must_use]
+    pub fn of_meshes(contacts: &[MeshContact]) -> Vec<Self> {
+        let places: Vec<Contact> = contacts.iter().map(Contact::from).collect();
+        Self::numbered(&places, curves(contacts))
+    }
+
+    /// Groups contacts by their numbers, which are counted from 0 in the order of first contacts.
+    fn numbered(contacts: &[Contact], numbers: Vec<usize>) -> Vec<Self> {
         let mut groups: Vec<Self> = Vec::new();
-        for (i, number) in components(&places, link).into_iter().enumerate() {
-            // A component's number first appears at its first place.
+        for (i, number) in numbers.into_iter().enumerate() {
+            let place = contacts[i].point;
             if number == groups.len() {
                 groups.push(Self { contacts: Vec::new(), bounds: Aabb::EMPTY, nearest: i });
             }
             let group = &mut groups[number];
             group.contacts.push(i);
-            group.bounds.grow(places[i]);
+            group.bounds.grow(place);
             if contacts[i].residual < contacts[group.nearest].residual {
                 group.nearest = i;
             }

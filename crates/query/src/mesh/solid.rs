@@ -112,12 +112,30 @@ impl Parts {
     }
 }
 
+/// Some pieces of a mesh.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SomePieces<'a> {
+    /// The number of the piece of each triangle, in leaf order.
+    pub(crate) of: &'a [u32],
+    /// The numbers of the pieces, ascending.
+    pub(crate) kept: &'a [u32],
+}
+
+impl SomePieces<'_> {
+    /// Returns `true` if the `i`-th triangle in leaf order belongs to one of the pieces.
+    pub(crate) fn contain(&self, i: usize) -> bool {
+        self.kept.binary_search(&self.of[i]).is_ok()
+    }
+}
+
 /// A solid and the arrays of its mesh.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SolidView<'a> {
     pub(crate) mesh: &'a MeshHierarchy,
     pub(crate) view: &'a MeshView<'a>,
     pub(crate) solid: &'a MeshSolid,
+    /// The pieces that count, if not all do.
+    pub(crate) some: Option<SomePieces<'a>>,
     pub(crate) level: Level,
 }
 
@@ -226,7 +244,7 @@ impl PlaceVisitor for Ray<'_> {
         let [from, to] = self.corners;
         let segment = [from, to, to];
         for i in self.of.view.tree.topology().points_of_leaf(number) {
-            if !self.of.solid.is_closed_at(i) {
+            if !self.of.solid.is_closed_at(i) || self.of.some.is_some_and(|some| !some.contain(i)) {
                 continue;
             }
             let corners = self.of.view.corners(i);

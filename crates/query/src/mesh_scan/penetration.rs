@@ -151,8 +151,7 @@ impl<'s> MeshScanProbe<'s> {
 
     /// The solid of the whole mesh.
     fn solid_view(&self) -> SolidView<'s> {
-        let MeshPiece { whole: mesh, solid, .. } = self.mesh;
-        SolidView { mesh, view: self.whole_view, solid, level: self.contact.level }
+        self.mesh.solid_view(self.whole_view, self.contact.level)
     }
 
     /// Returns `true` if a part of one is inside the other, which is solid, after a shift.
@@ -167,7 +166,7 @@ impl<'s> MeshScanProbe<'s> {
             return true;
         }
         is_scan_solid
-            && self.mesh.pieces.places(self.view).any(|place| {
+            && self.mesh.any_place(self.whole_view, |place| {
                 self.spent.evaluations += 1;
                 let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
                 contains(&self.whole_scan, &(Vector::from(pose.apply(place)) + t), working)

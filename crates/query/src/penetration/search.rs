@@ -166,7 +166,8 @@ impl<P: Probe> Search<'_, P> {
     fn along(&mut self, way: Vector, from: f64) -> ControlFlow<()> {
         let most = self.best.length * (1.0 - GAIN);
         let (mut meets, mut length) = (from, from.max(self.best.length / 256.0));
-        while meets < most {
+        // The least numbers have no half.
+        while meets < most && length > 0.0 {
             length = length.min(most);
             if self.probe.is_apart(way * length)? {
                 self.best = Shift { way, length, meets };
@@ -177,9 +178,10 @@ impl<P: Probe> Search<'_, P> {
         ControlFlow::Continue(())
     }
 
-    /// Shortens the best shift along its direction, up to a relative error.
+    /// Shortens the best shift along its direction, up to a relative error or the rounding of coordinates.
     fn bisect(&mut self, relative: f64) -> ControlFlow<()> {
-        while self.best.length - self.best.meets > relative * self.best.length {
+        let rounding = self.probe.rounding().max(f64::MIN_POSITIVE);
+        while self.best.length - self.best.meets > (relative * self.best.length).max(rounding) {
             let middle = 0.5 * (self.best.length + self.best.meets);
             if self.probe.is_apart(self.best.way * middle)? {
                 self.best.length = middle;

@@ -116,7 +116,13 @@ impl<'s> ShapeMeshProbe<'s> {
     }
 
     fn solid_view(&self) -> SolidView<'s> {
-        SolidView { mesh: self.mesh.mesh(), view: self.view, solid: self.parts, level: self.level }
+        SolidView {
+            mesh: self.mesh.mesh(),
+            view: self.view,
+            solid: self.parts,
+            some: None,
+            level: self.level,
+        }
     }
 
     /// Measures how deep a place is in the closed parts of the mesh and in the shape. A place beside the core

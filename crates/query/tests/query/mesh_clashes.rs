@@ -4,7 +4,7 @@ use nearmiss_geometry::{PointCloud, Pose, TriangleMesh};
 use nearmiss_hierarchy::{BuildOptions, MeshBuildOptions, MeshHierarchy, PointHierarchy};
 use nearmiss_query::{
     Budget, CollideOptions, Contact, ContactGroup, Contacts, Interior, MeshPair, MeshScanPair, MeshScanPlan,
-    MeshScratch, MeshSolid, Penetration, Placed, PlacedMesh, Scratch, default_link, default_mesh_link,
+    MeshScratch, MeshSolid, Penetration, Placed, PlacedMesh, Scratch, default_link,
 };
 use nearmiss_testdata::shapes::{Form, Order, Sampling, cuboid, patch, sphere};
 
@@ -32,7 +32,12 @@ fn mesh(forms: &Scene) -> (MeshHierarchy, MeshSolid) {
 
 /// The forms at their poses as one scan.
 fn scan(forms: &Scene) -> PointHierarchy {
-    let sampling = Sampling { spacing: SPACING, noise: 0.0, order: Order::Random, seed: 3 };
+    scan_of(forms, SPACING)
+}
+
+/// The same with other distances of points.
+fn scan_of(forms: &Scene, spacing: f64) -> PointHierarchy {
+    let sampling = Sampling { spacing, noise: 0.0, order: Order::Random, seed: 3 };
     let points: Vec<[f64; 3]> = forms
         .iter()
         .flat_map(|(form, pose)| {
@@ -53,7 +58,11 @@ fn row(radius: f64, apart: f64, top: f64, depths: &[f64]) -> Vec<(Form, Pose)> {
 
 /// The clashes of a pair, in the order of their centres along x.
 fn in_order(contacts: &[Contact], link: f64) -> Vec<ContactGroup> {
-    let mut groups = ContactGroup::all(contacts, link);
+    sorted(ContactGroup::all(contacts, link))
+}
+
+/// The groups in the order of their centres along x.
+fn sorted(mut groups: Vec<ContactGroup>) -> Vec<ContactGroup> {
     groups.sort_by(|p, q| p.centre()[0].total_cmp(&q.centre()[0]));
     groups
 }
@@ -61,9 +70,9 @@ fn in_order(contacts: &[Contact], link: f64) -> Vec<ContactGroup> {
 /// The clashes of two meshes and their depths.
 fn of_meshes(pair: &MeshPair<'_>, solids: [&MeshSolid; 2]) -> (Vec<ContactGroup>, Vec<Penetration>) {
     let (mut contacts, scratch) = (Vec::new(), &mut MeshScratch::default());
-    assert!(pair.contacts(&mut contacts, scratch).1);
-    let places: Vec<Contact> = contacts.iter().map(Contact::from).collect();
-    let groups = in_order(&places, default_mesh_link(&contacts));
+    let (_, complete) = pair.contacts(&mut contacts, scratch);
+    assert!(complete, "{} contacts", contacts.len());
+    let groups = sorted(ContactGroup::of_meshes(&contacts));
     let whole = pair.penetration(solids, scratch);
     let (asked, mut told) = (groups.iter().collect::<Vec<_>>(), Vec::new());
     let found = pair.depths((&contacts, &asked), solids, &whole, &mut |share| told.push(share));
@@ -139,6 +148,34 @@ fn clashes_of_meshes_with_cavities_pipes_and_large_triangles() {
         assert!((depth.upper - 0.95).abs() < 0.005 && depth.direction[0] < -0.99, "{turn}: {depth:?}");
     }
 
+    // The same with fins that share corners with the inner faces.
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for size in [6.0, 5.0] {
+        let own = cuboid([2.0 * size; 3]).tessellated(1.0);
+        let first = u32::try_from(vertices.len()).unwrap();
+        vertices.extend(own.vertices().iter().copied());
+        triangles.extend(own.triangles().iter().map(|t| t.map(|v| v + first)));
+    }
+    let first = u32::try_from(vertices.len()).unwrap();
+    for (i, corner) in
+        (0..8_u8).map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 1 { 5.0 } else { -5.0 })).enumerate()
+    {
+        let at = first + 3 * u32::try_from(i).unwrap();
+        vertices.extend([corner, corner.map(|c| 0.98 * c), [0.98 * corner[0], corner[1], 0.97 * corner[2]]]);
+        triangles.push([at, at + 1, at + 2]);
+    }
+    let finned = TriangleMesh::new(vertices, triangles).unwrap();
+    let finned = MeshHierarchy::build(&finned, &MeshBuildOptions::default()).unwrap();
+    let with_fins = MeshSolid::new(&finned);
+    assert!(with_fins.is_closed(), "the faces are");
+    for turn in 0..6_u8 {
+        let at = Pose::from_axis_angle([0.2, 0.5, 1.0], f64::from(turn)).with_translation([5.05, 0.1, 0.07]);
+        let pair = MeshPair::new(PlacedMesh::new(&finned, &Pose::IDENTITY), PlacedMesh::new(&ball, &at));
+        let (_, found) = of_meshes(&pair, [&with_fins, &own]);
+        let [depth] = found[..] else { panic!("{found:?}") };
+        assert!((depth.upper - 0.95).abs() < 0.005 && depth.direction[0] < -0.99, "{turn}: {depth:?}");
+    }
+
     // A pipe through a wall leaves it sideways; one that ends in it leaves it along its axis.
     let wall = TriangleMesh::new(
         vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
@@ -155,6 +192,52 @@ fn clashes_of_meshes_with_cavities_pipes_and_large_triangles() {
     let [through, ends] = found[..] else { panic!("{found:?}") };
     assert!((through.upper - 0.6).abs() < 0.01 && through.direction[0] < -0.99, "{through:?}");
     assert!((ends.upper - 0.05).abs() < 1e-3 && ends.direction[2] > 0.99, "{ends:?}");
+}
+
+/// Another body over a far corner of a large face does not count, whichever corner it is.
+#[test]
+fn other_bodies_do_not_deepen_a_clash() {
+    let plate = [(cuboid([10.0, 10.0, 1.0]), Pose::from_translation([0.0, 0.0, -0.5]))];
+    let (a, solid) = mesh(&plate);
+    let of_scan = scan_of(&[(cuboid([3.0, 3.0, 1.0]), Pose::from_translation([0.0, 0.0, -0.5]))], 0.05);
+    for corner in [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]] {
+        let balls = |far: f64, spacing: f64| {
+            let [x, y] = corner.map(|c| c * far);
+            let balls = [
+                (sphere(0.5), Pose::from_translation([0.0, 0.0, 0.48])),
+                (sphere(0.7), Pose::from_translation([x, y, 0.0])),
+            ];
+            (mesh(&balls), scan_of(&balls, spacing))
+        };
+        let ((b, own), _) = balls(5.0, 0.2);
+        let pair = MeshPair::new(PlacedMesh::new(&a, &Pose::IDENTITY), PlacedMesh::new(&b, &Pose::IDENTITY));
+        let (groups, found) = of_meshes(&pair, [&solid, &own]);
+        let middle = groups.iter().position(|group| group.centre()[0].abs() < 1.0).unwrap();
+        let depth = found[middle];
+        assert!((depth.upper - 0.02).abs() < 2e-3 && depth.lower > 0.015, "{corner:?}: {depth:?}");
+
+        // The balls as a solid scan, and the block as one.
+        let scratch = &mut Scratch::default();
+        let (_, balls) = balls(5.0, 0.04);
+        let ((small, own_small), _) = (mesh(&plate), ());
+        for (points, other, own, exact) in [(&balls, &small, &own_small, 0.02), (&of_scan, &b, &own, 0.02)] {
+            let scan = Placed::new(points, &Pose::IDENTITY);
+            let pair = MeshScanPair::new(scan, PlacedMesh::new(other, &Pose::IDENTITY));
+            let plan = MeshScanPlan::new(&CollideOptions::estimated(), points).unwrap();
+            let mut contacts = Contacts::default();
+            pair.contacts(&plan, &mut contacts, scratch);
+            let groups = in_order(&contacts.contacts, default_link([&scan; 2]));
+            let groups: Vec<&ContactGroup> =
+                groups.iter().filter(|group| group.centre()[..2].iter().all(|c| c.abs() < 0.6)).collect();
+            let whole = pair.penetration(&plan, (Interior::Solid, own), scratch);
+            let asked = (contacts.contacts.as_slice(), groups.as_slice());
+            let found = pair.depths(asked, (&plan, Interior::Solid, own), &whole, &mut |_| ());
+            assert!(!found.is_empty(), "{corner:?}");
+            for depth in found {
+                assert!((depth.upper - exact).abs() < scan.sampling_radius(), "{corner:?}: {depth:?}");
+            }
+        }
+    }
 }
 
 /// Fins, which are open, in a floor, close to each other: another one is no piece of a clash.
@@ -188,6 +271,33 @@ fn clashes_of_open_meshes_count_linked_triangles() {
     let strange = ContactGroup { contacts: vec![usize::MAX], ..groups[0].clone() };
     let odd = pair.depths((&contacts, &[&strange]), [&open, &own], &whole, &mut |_| ());
     assert!((odd[0].upper - whole.upper).abs() < 1e-9, "{odd:?}");
+}
+
+/// Curves are clashes, whatever the sizes of triangles; coplanar faces are one.
+#[test]
+fn clashes_of_meshes_are_connected_curves() {
+    // A large floor of two triangles; small boxes close to each other, and one that lies on the floor.
+    let corners = vec![[-50.0, -50.0, 0.0], [50.0, -50.0, 0.0], [50.0, 50.0, 0.0], [-50.0, 50.0, 0.0]];
+    let floor = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+    let floor = MeshHierarchy::build(&floor, &MeshBuildOptions::default()).unwrap();
+    let at = |x: f64, z: f64| (cuboid([0.4, 0.4, 0.4]), Pose::from_translation([x, 0.03, z]));
+    let (boxes, _) = mesh(&[at(0.0, 0.1), at(0.5, 0.0), at(1.0, 0.1), at(2.0, 0.2), at(9.0, 5.0)]);
+    for pose in
+        [Pose::IDENTITY, Pose::from_axis_angle([0.3, 0.2, 0.9], 1.0).with_translation([700.0, 3.0, -20.0])]
+    {
+        let pair = MeshPair::new(PlacedMesh::new(&floor, &pose), PlacedMesh::new(&boxes, &pose));
+        let mut contacts = Vec::new();
+        pair.contacts(&mut contacts, &mut MeshScratch::default());
+        let groups = ContactGroup::of_meshes(&contacts);
+        // A turned box that lies on the floor may be off by rounding.
+        let expected = if pose == Pose::IDENTITY { 4 } else { groups.len().clamp(3, 4) };
+        assert_eq!(groups.len(), expected, "{groups:?}");
+        let count: usize = groups.iter().map(|group| group.contacts.len()).sum();
+        assert_eq!(count, contacts.len());
+        assert!(groups.iter().all(|group| group.diagonal() < 0.9), "{groups:?}");
+        assert!(groups.iter().map(|group| group.contacts[0]).is_sorted(), "{groups:?}");
+    }
+    assert!(ContactGroup::of_meshes(&[]).is_empty());
 }
 
 /// A scan against a mesh, each of which has the balls.

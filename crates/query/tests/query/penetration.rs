@@ -331,3 +331,23 @@ fn invalid_questions_have_no_known_penetration() {
     let found = pair.penetration([&solid, &other], scratch);
     assert!(found.upper > 1.5 - 1e-9 && found.upper < 1.5001 && found.lower > 1.49, "{found:?}");
 }
+
+/// Things that only touch, at the origin of coordinates, are apart after any shift.
+#[test]
+fn things_that_touch_at_zero_end_the_search() {
+    let floor =
+        TriangleMesh::new(vec![[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]], vec![[0, 1, 2]])
+            .unwrap();
+    let standing =
+        TriangleMesh::new(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], vec![[0, 1, 2]]).unwrap();
+    let cube = cuboid([0.5; 3]);
+    let up = Pose::from_translation([0.0, 0.0, 0.5]);
+    for (b, pose) in [(&standing, Pose::IDENTITY), (&cube, up), (&floor, Pose::IDENTITY)] {
+        for work in [None, Some(1), Some(100), Some(10_000)] {
+            let budget = work.map_or(Budget::UNLIMITED, |work| Budget::UNLIMITED.with_work(work));
+            let found = ask([&floor, b], [Pose::IDENTITY, pose], &budget);
+            assert!(work == Some(1) || found.upper < 1e-9 || !found.complete, "{work:?}: {found:?}");
+            assert!(found.lower <= 1e-12, "{work:?}: {found:?}");
+        }
+    }
+}

@@ -39,17 +39,17 @@ impl MeshScanPair<'_> {
         let first = (0.5 * default_link([scan; 2])).max(plan.reach());
         let knows_parts = plan.options().metric != Some(Metric::Geodesic);
         each(groups, told, Scratch::default, |group, scratch| {
-            let of = (whole, group.contacts.len() == contacts.len());
-            depth(&group.bounds, of, (first, self.budget()), |bounds| {
-                if !knows_parts {
-                    return OfParts::Whole;
-                }
+            if !knows_parts {
+                return Penetration { lower: 0.0, ..*whole };
+            }
+            let at = parted_mesh.at(group);
+            depth(&group.bounds, whole, (first, self.budget()), |bounds| {
                 let of_scan = parted_scan.part(group, bounds);
-                let of_mesh = parted_mesh.part(group, bounds);
+                let of_mesh = at.part(bounds);
                 if matches!((&of_scan, &of_mesh), (ScanPart::Whole, MeshPart::Whole)) {
                     return OfParts::Whole;
                 }
-                let (Some(part), Some(piece)) = (of_scan.of(scan), of_mesh.of(&parted_mesh)) else {
+                let (Some(part), Some(piece)) = (of_scan.of(scan), at.piece(&of_mesh)) else {
                     return OfParts::Unknown;
                 };
                 let Scratch { contact, solid: shapes, penetration: own, .. } = &mut *scratch;

@@ -40,14 +40,14 @@ impl MeshPair<'_> {
             PartedMesh::new(&meshes[k], solids[k], || contacts.iter().map(|contact| contact.triangles[k]))
         });
         each(groups, told, MeshScratch::default, |group, scratch| {
-            let of = (whole, group.contacts.len() == contacts.len());
             let ends = group.contacts.iter().filter_map(|&i| contacts.get(i)).flat_map(|found| found.ends);
-            depth(&Aabb::of(ends), of, (LEAST * whole.upper, self.budget()), |bounds| {
-                let parts = parted.each_ref().map(|mesh| mesh.part(group, bounds));
+            let at = parted.each_ref().map(|mesh| mesh.at(group));
+            depth(&Aabb::of(ends), whole, (LEAST * whole.upper, self.budget()), |bounds| {
+                let parts = at.each_ref().map(|mesh| mesh.part(bounds));
                 if matches!(parts, [MeshPart::Whole, MeshPart::Whole]) {
                     return OfParts::Whole;
                 }
-                let [Some(a), Some(b)] = [0, 1].map(|k: usize| parts[k].of(&parted[k])) else {
+                let [Some(a), Some(b)] = [0, 1].map(|k: usize| at[k].piece(&parts[k])) else {
                     return OfParts::Unknown;
                 };
                 let (level, stack, survey) = scratch.of_penetration();

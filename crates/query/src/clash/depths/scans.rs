@@ -53,11 +53,10 @@ impl Pair<'_> {
         let first = (0.5 * default_link(scans.each_ref())).max(plan.reach());
         let knows_parts = plan.options().metric != Some(Metric::Geodesic);
         each(groups, told, Scratch::default, |group, scratch| {
-            let of = (whole, group.contacts.len() == contacts.len());
-            depth(&group.bounds, of, (first, &self.budget), |bounds| {
-                if !knows_parts {
-                    return OfParts::Whole;
-                }
+            if !knows_parts {
+                return Penetration { lower: 0.0, ..*whole };
+            }
+            depth(&group.bounds, whole, (first, &self.budget), |bounds| {
                 let parts = parted.each_ref().map(|scan| scan.part(group, bounds));
                 if matches!(parts, [ScanPart::Whole, ScanPart::Whole]) {
                     return OfParts::Whole;

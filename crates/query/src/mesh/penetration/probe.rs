@@ -14,7 +14,7 @@ use crate::mesh::penetration::MeshPiece;
 use crate::mesh::penetration::contacts::survey;
 use crate::mesh::penetration::triangle_depth::triangle_depth;
 use crate::mesh::placed::PlacedMesh;
-use crate::mesh::solid::{MeshSolid, SolidView};
+use crate::mesh::solid::SolidView;
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::probe::{Deep, Probe, Vector};
 use crate::penetration::survey::ContactSurvey;
@@ -24,8 +24,9 @@ use crate::penetration::survey::ContactSurvey;
 pub(crate) struct MeshProbe<'s> {
     meshes: [PlacedMesh<'s>; 2],
     views: &'s [MeshView<'s>; 2],
-    /// The pieces of each mesh.
-    pieces: [&'s MeshSolid; 2],
+    pieces: [MeshPiece<'s>; 2],
+    /// The arrays of the whole meshes.
+    wholes: &'s [MeshView<'s>; 2],
     /// The solids, of the whole meshes; `None` without a closed part.
     solids: [Option<SolidView<'s>>; 2],
     /// `true` if both meshes are whole ones.
@@ -44,14 +45,13 @@ impl<'s> MeshProbe<'s> {
         budget: &Budget,
         (level, stack): (Level, &'s mut Stack),
     ) -> Self {
-        let solids = [0, 1].map(|k: usize| {
-            let MeshPiece { whole, solid, .. } = pieces[k];
-            solid.is_closed().then_some(SolidView { mesh: whole, view: &wholes[k], solid, level })
-        });
+        let solids = [0, 1]
+            .map(|k: usize| pieces[k].solid.is_closed().then(|| pieces[k].solid_view(&wholes[k], level)));
         Self {
             meshes: pieces.map(|piece| piece.part),
             views,
-            pieces: pieces.map(|piece| piece.pieces),
+            pieces,
+            wholes,
             solids,
             are_whole: pieces.iter().all(|piece| std::ptr::eq(piece.part.mesh(), piece.whole)),
             budget: *budget,
@@ -104,7 +104,7 @@ impl<'s> MeshProbe<'s> {
         (0..2).any(|k| {
             let Some(outer) = self.solids[k] else { return false };
             let other = 1 - k;
-            self.pieces[other].places(&self.views[other]).any(|place| {
+            self.pieces[other].any_place(&self.wholes[other], |place| {
                 self.spent.evaluations += 1;
                 outer.contains(poses[k].apply_inverse(poses[other].apply(place)))
             })
@@ -115,6 +115,7 @@ impl<'s> MeshProbe<'s> {
 impl Probe for MeshProbe<'_> {
     /// The direction is that in which the two triangles there are separated soonest.
     fn touch(&mut self, t: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
+        self.budget.go_on(self.spent.work())?;
         let meshes = self.shifted(t);
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         let (flow, met) = first_met(&mut pair, self.stack);
@@ -129,6 +130,8 @@ impl Probe for MeshProbe<'_> {
 
     /// If no triangles meet, each part of a mesh is inside or outside of the other solid as a whole.
     fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
+        // A test that ends at the first pair of leaves does not ask.
+        self.budget.go_on(self.spent.work())?;
         let meshes = self.shifted(t);
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         let are_balls_apart = pair.gap > 0.0;
