@@ -41,6 +41,7 @@ struct Question {
     /// The plan of distance queries for the clearance along a path, if it is needed.
     clearance: Option<DistancePlan>,
     sizes: SizeCheck,
+    console: Console,
 }
 
 impl Question {
@@ -103,6 +104,7 @@ impl Question {
             // Lines for people have no room for depths.
             let is_told = args.json || asked.line.is_none();
             if let (true, Some(insides), Some(whole)) = (is_told, &self.insides, &asked.penetration) {
+                let _bar = asked.line.is_none().then(|| self.console.spinner("measuring the clashes"));
                 let groups = (all, grouped.groups.as_slice());
                 grouped.depths = views.depths(&self.plan, insides, groups, whole, &self.budget_from(now()));
             }
@@ -264,6 +266,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         insides,
         clearance,
         sizes,
+        console,
     };
 
     let mut results = Results::new();

@@ -123,7 +123,12 @@ impl Grouped {
             let contacts = count(group.contacts.len() as u64, "contact");
             let depth = self.depths.get(number - 1).filter(|depth| depth.upper.is_finite());
             let depth = depth.map_or_else(String::new, |depth| {
-                format!(", {}{} deep", if depth.complete { "" } else { "at most " }, short(depth.upper))
+                let most = if depth.complete { "" } else { "at most " };
+                if depth.upper < unit {
+                    format!(", less than {} deep", short(unit))
+                } else {
+                    format!(", {most}{} deep", short(depth.upper))
+                }
             });
             format!(
                 "  clash {number}: {contacts} about {}, {x} × {y} × {z}{depth}",

@@ -34,7 +34,8 @@ pub struct MeshCollideArgs {
     /// Also report how far and in which direction to move B out of A
     ///
     /// Closed parts count as solid, other parts as surfaces. The distance is reported as a lower and an
-    /// upper bound, which hold even if --budget or --work ends the search.
+    /// upper bound, which hold even if --budget or --work ends the search. With --all, each clash has its
+    /// depth as well.
     #[arg(long)]
     pub penetration: bool,
     /// Time limit for each query, such as 200us

@@ -29,6 +29,7 @@ struct Question<'a> {
     args: &'a MeshCollideArgs,
     /// `true` if the clearance of separated poses is needed.
     clearance: bool,
+    console: Console,
 }
 
 /// A query and its answer.
@@ -85,7 +86,7 @@ pub(crate) fn run(args: &MeshCollideArgs) -> Result<(), CliError> {
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
     let meshes = TwoMeshes::open(&args.pair, args.threads, (args.budget, args.work), console)?;
     let clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
-    let question = Question { meshes, args, clearance };
+    let question = Question { meshes, args, clearance, console };
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
@@ -202,6 +203,7 @@ impl Question<'_> {
             // Lines for people have no room for depths.
             let is_told = self.args.json || asked.line.is_none();
             if let Some(whole) = asked.penetration.as_ref().filter(|_| is_told) {
+                let _bar = asked.line.is_none().then(|| self.console.spinner("measuring the clashes"));
                 all.measure(&self.meshes.pair(&asked.poses, now()), self.solids(), whole);
             }
             (all, *complete)
