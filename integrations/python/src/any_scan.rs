@@ -290,9 +290,9 @@ impl AnyScan {
     /// fields are `hard` (false if they only come nearer than the clearance), `centre` and `size` of the
     /// box about the contacts, `lower` and `upper` (bounds of the least distance), `depth` (the length of a
     /// move of `other` out of the clash, along `depth_direction`), `depth_lower` (no shorter move does;
-    /// all three are NaN where no depth is known), `evidence`, `contacts` and `surroundings` (their numbers), and of the best contact `point`, `residual`,
-    /// `source_a` and `source_b`. Options: `thickened` and `surface_only`. Warns if the clearance is so
-    /// great that the search ended early.
+    /// all three are NaN where no depth is known), `evidence`, `contacts` and `surroundings` (their
+    /// numbers), and of the best contact `point`, `residual`, `source_a` and `source_b`. Options:
+    /// `thickened` and `surface_only`. Warns if the clearance is so great that the search ended early.
     #[pyo3(signature = (
         other, pose = None, own_pose = None, *, clearance = 0.0, link = None, depth = false, solid = None, **options
     ))]

@@ -32,11 +32,15 @@ pub fn components(places: &[[f64; 3]], link: f64) -> Vec<usize> {
         joining.grow(&mut order, 0);
         joining.join(&order, 0, 0);
     }
-    let mut numbers = vec![0; places.len()];
-    let mut count = 0;
-    for i in 0..places.len() {
-        let root = joining.root(i);
-        // The root of a component is its first place.
+    numbered(places.len(), |i| joining.root(i))
+}
+
+/// Returns the number of the set of each item, counted from 0 in the order of first items. `root` returns the
+/// first item of a set.
+pub(crate) fn numbered(items: usize, mut root: impl FnMut(usize) -> usize) -> Vec<usize> {
+    let (mut numbers, mut count) = (vec![0; items], 0);
+    for i in 0..items {
+        let root = root(i);
         if root == i {
             numbers[i] = count;
             count += 1;

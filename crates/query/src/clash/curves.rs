@@ -3,7 +3,7 @@
 use nearmiss_geometry::Aabb;
 use nearmiss_lanes::id32;
 
-use crate::clash::components::components;
+use crate::clash::components::{components, numbered};
 use crate::mesh::answer::MeshContact;
 use crate::mesh::solid::Parts;
 
@@ -33,18 +33,7 @@ pub(crate) fn curves(contacts: &[MeshContact]) -> Vec<usize> {
     let widest = flat.iter().map(width).fold(0.0, f64::max);
     join_by(&components(&middles, widest), &mut sets, |k| id32(flat[k]));
 
-    // The root of a set is its first contact.
-    let (mut numbers, mut count) = (vec![0; contacts.len()], 0);
-    for i in 0..contacts.len() {
-        let root = sets.root(id32(i)) as usize;
-        if root == i {
-            numbers[i] = count;
-            count += 1;
-        } else {
-            numbers[i] = numbers[root];
-        }
-    }
-    numbers
+    numbered(contacts.len(), |i| sets.root(id32(i)) as usize)
 }
 
 /// Joins the items with equal numbers. `contact` returns the contact of an item.

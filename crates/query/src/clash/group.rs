@@ -31,10 +31,9 @@ impl ContactGroup {
         Self::numbered(contacts, components(&places, link))
     }
 
-    /// Groups contacts of meshes that lie on connected curves: each curve on which the surfaces intersect is a
-    /// group, however long the segments are of which it consists. Contacts of triangles in one plane are
-    /// grouped by the distances of their middles. The groups are in the order of their first contacts. n log n
-    /// steps.
+    /// Groups contacts of meshes that lie on connected curves: each curve on which the surfaces intersect is
+    /// a group, however long its segments are. Contacts of triangles in one plane are grouped by the
+    /// distances of their middles. The groups are in the order of their first contacts. n log n steps.
     #[must_use]
     pub fn of_meshes(contacts: &[MeshContact]) -> Vec<Self> {
         let places: Vec<Contact> = contacts.iter().map(Contact::from).collect();

@@ -61,7 +61,7 @@ impl MeshScratch {
         (self.level, &mut self.stack)
     }
 
-    /// What a penetration needs.
+    /// The memory of a penetration.
     pub(crate) fn of_penetration(&mut self) -> (Level, &mut Stack, &mut ContactSurvey) {
         (self.level, &mut self.stack, &mut self.penetration)
     }

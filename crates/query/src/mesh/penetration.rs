@@ -1,55 +1,22 @@
 //! The penetration of two meshes: how far and in which direction to shift one out of the other.
 
 mod contacts;
+pub(crate) mod piece;
 mod probe;
 mod triangle_depth;
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::{MeshHierarchy, MeshView, Stack};
+use nearmiss_hierarchy::Stack;
 
 use crate::ask::answer::Evidence;
 use crate::ask::budget::Budget;
+use crate::mesh::penetration::piece::MeshPiece;
 use crate::mesh::placed::PlacedMesh;
-use crate::mesh::solid::{MeshSolid, SolidView, SomePieces};
+use crate::mesh::solid::MeshSolid;
 use crate::penetration::answer::Penetration;
 use crate::penetration::search::search;
 use crate::penetration::survey::ContactSurvey;
 use probe::MeshProbe;
-
-/// A placed mesh or a part of one.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct MeshPiece<'s> {
-    pub(crate) part: PlacedMesh<'s>,
-    /// A place on each piece of the part, in the frame of the mesh's input; `None` for a whole mesh.
-    pub(crate) places: Option<&'s [[f64; 3]]>,
-    /// The whole mesh, at the same pose.
-    pub(crate) whole: &'s MeshHierarchy,
-    /// The solid of the whole mesh.
-    pub(crate) solid: &'s MeshSolid,
-    /// The pieces of the whole mesh that count, if not all do.
-    pub(crate) some: Option<SomePieces<'s>>,
-}
-
-impl<'s> MeshPiece<'s> {
-    pub(crate) fn whole(mesh: PlacedMesh<'s>, solid: &'s MeshSolid) -> Self {
-        Self { part: mesh, places: None, whole: mesh.mesh(), solid, some: None }
-    }
-
-    /// The solid of the mesh, whose arrays these are.
-    pub(crate) fn solid_view(&self, view: &'s MeshView<'s>, level: Level) -> SolidView<'s> {
-        let Self { whole: mesh, solid, some, .. } = *self;
-        SolidView { mesh, view, solid, some, level }
-    }
-
-    /// Calls `is_met` with a place on each piece, in the frame of the mesh's input, until it returns `true`.
-    /// `view` has the arrays of the whole mesh. Returns `true` if it did.
-    pub(crate) fn any_place(&self, view: &MeshView<'_>, is_met: impl FnMut([f64; 3]) -> bool) -> bool {
-        match self.places {
-            Some(places) => places.iter().copied().any(is_met),
-            None => self.solid.places(view).any(is_met),
-        }
-    }
-}
 
 /// Bounds the penetration of two placed meshes with these solids.
 pub(crate) fn penetration(

@@ -10,7 +10,7 @@ use crate::ask::budget::Budget;
 use crate::ask::options::Semantics;
 use crate::contact::collide::ContactScratch;
 use crate::mesh::foot::{depth_in_solid, foot};
-use crate::mesh::penetration::MeshPiece;
+use crate::mesh::penetration::piece::MeshPiece;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::{MeshSolid, SolidView};
 use crate::mesh_scan::collide::{AskedOfMesh, collide};

@@ -119,8 +119,8 @@ fn each_clash_of_meshes_has_the_depth_of_its_own_place() {
     }
 }
 
-/// What leaves one surface of a solid must leave the solid; what passes through a wall leaves it as a whole;
-/// triangles may be much larger than the clash.
+/// The way out of one surface of a solid leads out of the solid, and the way of a pipe out of the wall that
+/// it passes through; triangles may be much larger than the clash.
 #[test]
 fn clashes_of_meshes_with_cavities_pipes_and_large_triangles() {
     // A ball in a cavity of a block.

@@ -9,7 +9,7 @@ use nearmiss_mesh::nearest_on_triangle;
 use crate::clash::depths::MOST_ITEMS;
 use crate::clash::group::ContactGroup;
 use crate::clash::stored::positions;
-use crate::mesh::penetration::MeshPiece;
+use crate::mesh::penetration::piece::MeshPiece;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::{MeshSolid, Parts, SomePieces};
 
@@ -27,8 +27,8 @@ pub(super) struct PartedMesh<'a> {
 struct Pieces {
     /// The number of the piece of each triangle, in leaf order.
     of: Vec<u32>,
-    /// The numbers of pieces with closed triangles, and the bounding boxes of these, in the frame of the mesh's
-    /// input.
+    /// The numbers of pieces with closed triangles, and the bounding boxes of these, in the frame of the
+    /// mesh's input.
     closed: Vec<(u32, Aabb)>,
 }
 
@@ -75,9 +75,10 @@ impl<'a> PartedMesh<'a> {
 }
 
 impl MeshAtClash<'_, '_> {
-    /// The triangles whose bounding boxes meet `bounds`, a box in the world, and that belong to the contacts.
-    /// Those of a mesh with a closed part are all triangles of the pieces that meet there, and of closed pieces
-    /// around or inside of these. Those of another mesh are linked to the contacts within the box.
+    /// The triangles whose bounding boxes meet `bounds`, a box in the world, and that belong to the
+    /// contacts. Those of a mesh with a closed part are all triangles of the pieces that meet there, and of
+    /// closed pieces around or inside of these. Those of another mesh are linked to the contacts within the
+    /// box.
     pub(super) fn part(&self, bounds: &Aabb) -> MeshPart {
         let PartedMesh { mesh: placed, pieces, .. } = self.parted;
         let (mesh, pose) = (placed.mesh(), placed.pose());

@@ -20,9 +20,10 @@ impl MeshPair<'_> {
     ///
     /// Has the definition, the bounds and the arguments of [`Pair::depths`](crate::Pair::depths). The *part*
     /// of a mesh is those triangles whose bounding boxes meet B, the bounding box of the contacts grown by m,
-    /// and that are linked to these contacts by common vertices of such triangles. Of a mesh with a closed part
-    /// it is all triangles that meet B of the pieces with a contact, and of closed pieces around or inside of
-    /// these. `whole` is the [penetration](Self::penetration) of the pair with the same `solids`.
+    /// and that are linked to these contacts by common vertices of such triangles. Of a mesh with a closed
+    /// part it is all triangles that meet B of the pieces with a contact, and of closed pieces around or
+    /// inside of these; other pieces are no solids then. `whole` is the [penetration](Self::penetration) of
+    /// the pair with the same `solids`.
     ///
     /// Parts are prepared as meshes of their own, so a depth costs about a microsecond for each triangle
     /// around the clash, and some hundred collision queries. A mesh with more than 200,000 triangles in a
