@@ -217,7 +217,7 @@ fn scans_that_are_apart_have_no_clash_and_bad_lengths_are_refused() {
 }
 
 /// Returns points of forms, each placed at a pose.
-fn scene(forms: &[(Form, Pose)], spacing: f64) -> PointHierarchy {
+pub(crate) fn scene(forms: &[(Form, Pose)], spacing: f64) -> PointHierarchy {
     let sampling = Sampling { spacing, noise: 0.0, order: Order::Random, seed: 4 };
     let points: Vec<[f64; 3]> = forms
         .iter()

@@ -1,12 +1,14 @@
 //! Depths of clashes of two meshes, and of a scan and a mesh, against known ones.
 
-use nearmiss_geometry::{PointCloud, Pose, TriangleMesh};
-use nearmiss_hierarchy::{BuildOptions, MeshBuildOptions, MeshHierarchy, PointHierarchy};
+use nearmiss_geometry::{Pose, TriangleMesh};
+use nearmiss_hierarchy::{MeshBuildOptions, MeshHierarchy};
 use nearmiss_query::{
     Budget, CollideOptions, Contact, ContactGroup, Contacts, Interior, MeshPair, MeshScanPair, MeshScanPlan,
     MeshScratch, MeshSolid, Penetration, Placed, PlacedMesh, Scratch, default_link,
 };
-use nearmiss_testdata::shapes::{Form, Order, Sampling, cuboid, patch, sphere};
+use nearmiss_testdata::shapes::{Form, cuboid, patch, sphere};
+
+use crate::clashes::scene;
 
 /// The spacing of points and the length of edges.
 const SPACING: f64 = 0.03;
@@ -28,24 +30,6 @@ fn mesh(forms: &Scene) -> (MeshHierarchy, MeshSolid) {
     let prepared = MeshHierarchy::build(&mesh, &MeshBuildOptions::default()).unwrap();
     let solid = MeshSolid::new(&prepared);
     (prepared, solid)
-}
-
-/// The forms at their poses as one scan.
-fn scan(forms: &Scene) -> PointHierarchy {
-    scan_of(forms, SPACING)
-}
-
-/// The same with other distances of points.
-fn scan_of(forms: &Scene, spacing: f64) -> PointHierarchy {
-    let sampling = Sampling { spacing, noise: 0.0, order: Order::Random, seed: 3 };
-    let points: Vec<[f64; 3]> = forms
-        .iter()
-        .flat_map(|(form, pose)| {
-            let points = form.clone().sample(sampling).points;
-            points.into_iter().map(|p| pose.apply(p)).collect::<Vec<_>>()
-        })
-        .collect();
-    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
 /// Balls of this radius in a row along x, `apart` from each other, sunk to these depths below z = `top`.
@@ -199,7 +183,7 @@ fn clashes_of_meshes_with_cavities_pipes_and_large_triangles() {
 fn other_bodies_do_not_deepen_a_clash() {
     let plate = [(cuboid([10.0, 10.0, 1.0]), Pose::from_translation([0.0, 0.0, -0.5]))];
     let (a, solid) = mesh(&plate);
-    let of_scan = scan_of(&[(cuboid([3.0, 3.0, 1.0]), Pose::from_translation([0.0, 0.0, -0.5]))], 0.05);
+    let of_scan = scene(&[(cuboid([3.0, 3.0, 1.0]), Pose::from_translation([0.0, 0.0, -0.5]))], 0.05);
     for corner in [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]] {
         let balls = |far: f64, spacing: f64| {
             let [x, y] = corner.map(|c| c * far);
@@ -207,7 +191,7 @@ fn other_bodies_do_not_deepen_a_clash() {
                 (sphere(0.5), Pose::from_translation([0.0, 0.0, 0.48])),
                 (sphere(0.7), Pose::from_translation([x, y, 0.0])),
             ];
-            (mesh(&balls), scan_of(&balls, spacing))
+            (mesh(&balls), scene(&balls, spacing))
         };
         let ((b, own), _) = balls(5.0, 0.2);
         let pair = MeshPair::new(PlacedMesh::new(&a, &Pose::IDENTITY), PlacedMesh::new(&b, &Pose::IDENTITY));
@@ -315,7 +299,7 @@ fn each_clash_of_a_scan_and_a_mesh_has_the_depth_of_its_own_place() {
         (&balls[..], &floor[..], solid, -1.0),
         (&balls[..], &block[..], hollow, -1.0),
     ] {
-        let (a, (b, own)) = (scan(of_scan), mesh(of_mesh));
+        let (a, (b, own)) = (scene(of_scan, SPACING), mesh(of_mesh));
         for scale in [1.0, 20.0] {
             let pose = Pose::IDENTITY.with_scale(scale);
             let (a, b) = (Placed::new(&a, &pose), PlacedMesh::new(&b, &pose));

@@ -146,9 +146,7 @@ impl Pieces {
         kept.dedup();
         let is_met = |(piece, _): &&(u32, Aabb)| kept.binary_search(piece).is_ok();
         let met: Vec<Aabb> = self.closed.iter().filter(is_met).map(|(_, bounds)| *bounds).collect();
-        let is_around = |own: &Aabb| {
-            met.iter().any(|other| own.meets(other) && (own.encloses(other) || other.encloses(own)))
-        };
+        let is_around = |own: &Aabb| met.iter().any(|other| own.encloses(other) || other.encloses(own));
         let more = self.closed.iter().filter(|piece| !is_met(piece)).filter(|(_, bounds)| is_around(bounds));
         let more: Vec<u32> = more.map(|(piece, _)| *piece).collect();
         kept.extend(more);

@@ -25,6 +25,11 @@ impl<'s> MeshPiece<'s> {
         Self { part: mesh, places: None, whole: mesh.mesh(), solid, some: None }
     }
 
+    /// Returns `true` for a whole mesh.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.places.is_none()
+    }
+
     /// The solid of the mesh, whose arrays these are.
     pub(crate) fn solid_view(&self, view: &'s MeshView<'s>, level: Level) -> SolidView<'s> {
         let Self { whole: mesh, solid, some, .. } = *self;

@@ -22,15 +22,13 @@ use crate::penetration::survey::ContactSurvey;
 /// Two placed meshes, or parts of them, with their solids, and the cost of all tests so far. Shifts are
 /// those of b, in the world.
 pub(crate) struct MeshProbe<'s> {
-    meshes: [PlacedMesh<'s>; 2],
-    views: &'s [MeshView<'s>; 2],
     pieces: [MeshPiece<'s>; 2],
+    /// The arrays of the pieces.
+    views: &'s [MeshView<'s>; 2],
     /// The arrays of the whole meshes.
     wholes: &'s [MeshView<'s>; 2],
     /// The solids, of the whole meshes; `None` without a closed part.
     solids: [Option<SolidView<'s>>; 2],
-    /// `true` if both meshes are whole ones.
-    are_whole: bool,
     budget: Budget,
     level: Level,
     stack: &'s mut Stack,
@@ -47,23 +45,16 @@ impl<'s> MeshProbe<'s> {
     ) -> Self {
         let solids = [0, 1]
             .map(|k: usize| pieces[k].solid.is_closed().then(|| pieces[k].solid_view(&wholes[k], level)));
-        Self {
-            meshes: pieces.map(|piece| piece.part),
-            views,
-            pieces,
-            wholes,
-            solids,
-            are_whole: pieces.iter().all(|piece| std::ptr::eq(piece.part.mesh(), piece.whole)),
-            budget: *budget,
-            level,
-            stack,
-            spent: Statistics::default(),
-        }
+        Self { pieces, views, wholes, solids, budget: *budget, level, stack, spent: Statistics::default() }
+    }
+
+    fn meshes(&self) -> [PlacedMesh<'s>; 2] {
+        self.pieces.map(|piece| piece.part)
     }
 
     /// Returns the meshes with b shifted by `t`.
     fn shifted(&self, t: Vector) -> [PlacedMesh<'s>; 2] {
-        let [a, b] = self.meshes;
+        let [a, b] = self.meshes();
         [a, b.shifted(t.into())]
     }
 
@@ -84,7 +75,7 @@ impl<'s> MeshProbe<'s> {
     /// invalid.
     pub(crate) fn out_of_balls(&mut self) -> Option<Vector> {
         let balls = [0, 1].map(|k: usize| {
-            let (placed, ball) = (self.meshes[k].stored_to_world(), self.views[k].ball);
+            let (placed, ball) = (self.pieces[k].part.stored_to_world(), self.views[k].ball);
             (Vector::from(placed.apply(ball.centre)), ball.radius * placed.scale())
         });
         out_of_balls(balls, 0.0, |t| {
@@ -97,7 +88,7 @@ impl<'s> MeshProbe<'s> {
     /// Returns `true` if a piece of one mesh begins inside the solid of the other, for meshes without common
     /// points, whose bounding balls are apart or not.
     fn are_nested(&mut self, are_balls_apart: bool, meshes: &[PlacedMesh<'_>; 2]) -> bool {
-        if self.are_whole && are_balls_apart {
+        if are_balls_apart && self.pieces.iter().all(MeshPiece::is_whole) {
             return false;
         }
         let poses = meshes.map(|placed| *placed.pose());
@@ -145,7 +136,7 @@ impl Probe for MeshProbe<'_> {
     }
 
     fn survey(&mut self, found: &mut ContactSurvey) -> ControlFlow<()> {
-        let meshes = self.meshes;
+        let meshes = self.meshes();
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         let flow = survey(&mut pair, self.stack, found);
         self.spent.add(&pair.meter.spent);
@@ -154,12 +145,12 @@ impl Probe for MeshProbe<'_> {
 
     fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
         let [Some(a), Some(b)] = self.solids else { return ControlFlow::Continue(None) };
-        let meshes = self.meshes;
+        let meshes = self.meshes();
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         pair.meter.go_on()?;
         self.spent.evaluations += 1;
         let mut found = Deep { place, depth: 0.0, uphill: Vector::zeros() };
-        for (solid, placed) in [a, b].iter().zip(&self.meshes) {
+        for (solid, placed) in [a, b].iter().zip(&meshes) {
             let Some((depth, uphill)) = depth_in_solid(solid, placed, place) else {
                 return ControlFlow::Continue(None);
             };
@@ -172,13 +163,13 @@ impl Probe for MeshProbe<'_> {
     fn centres(&self) -> [Vector; 2] {
         [0, 1].map(|k| {
             let centre = self.views[k].tree.root_box().centre.map(f64::from);
-            self.meshes[k].stored_to_world().apply(centre).into()
+            self.pieces[k].part.stored_to_world().apply(centre).into()
         })
     }
 
     fn axes(&self) -> [[Vector; 3]; 2] {
         [0, 1].map(|k| {
-            let placed = self.meshes[k].stored_to_world();
+            let placed = self.pieces[k].part.stored_to_world();
             self.views[k].tree.root_box().axes.map(|axis| Vector::from(placed.rotate(axis.map(f64::from))))
         })
     }
@@ -189,7 +180,7 @@ impl Probe for MeshProbe<'_> {
 
     fn rounding(&self) -> f64 {
         let far = |k: usize| {
-            let (mesh, pose) = (self.meshes[k].mesh(), self.meshes[k].pose());
+            let (mesh, pose) = (self.pieces[k].part.mesh(), self.pieces[k].part.pose());
             let extent =
                 mesh.bounds().min.iter().chain(&mesh.bounds().max).fold(0.0_f64, |far, x| far.max(x.abs()));
             pose.scale() * extent + Vector::from(pose.translation()).amax()
