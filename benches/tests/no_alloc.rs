@@ -1,7 +1,7 @@
 //! Queries and evaluations allocate no memory once their scratch is warm.
 //!
-//! This is a single test because the counter covers the whole process, and a second test would run
-//! at the same time.
+//! This is a program without a test harness because the counter covers the whole process.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
@@ -72,12 +72,11 @@ fn ask_all(
     verdicts
 }
 
-#[test]
 #[expect(
     clippy::too_many_lines,
-    reason = "allocations are counted for the whole process, so one test runs at a time"
+    reason = "all tests share their scenes"
 )]
-fn warm_queries_and_evaluations_allocate_nothing() {
+fn main() {
     let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
     let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
     let mut poses: Vec<Pose> = poses::near(&object, POSES, 1).unwrap().iter().map(|near| near.pose).collect();

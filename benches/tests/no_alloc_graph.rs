@@ -1,6 +1,7 @@
 //! Searches in a graph and evaluations along it allocate no memory once their scratch is warm.
 //!
-//! This is a single test because the counter covers the whole process.
+//! This is a program without a test harness because the counter covers the whole process.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::graph::{
     ClosePairs, GeodesicKernel, GeodesicScratch, GraphOptions, KernelScratch, LevelScratch, Levels, Network,
@@ -13,8 +14,7 @@ use nearmiss_benches::object::Object;
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
 
-#[test]
-fn warm_searches_and_evaluations_allocate_nothing() {
+fn main() {
     let object = Object::read("dragon-5k").unwrap();
     let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
     let graph = PointGraph::build(scan.positions(), &GraphOptions::default()).unwrap();

@@ -1,4 +1,7 @@
 //! Events, changed plans and queries of a kinetic tree allocate no memory.
+//!
+//! This is a program without a test harness because the counter covers the whole process.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::kinetic::{FlightPlan, KineticTree};
 use nearmiss_benches::counting::Counting;
@@ -7,8 +10,7 @@ use nearmiss_testdata::arbitrary::{point_in, rng};
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
 
-#[test]
-fn events_plans_and_queries_ask_for_no_memory() {
+fn main() {
     let rng = &mut rng(1);
     let mut plan = |time| FlightPlan::linear(time, point_in(rng, 1.0), point_in(rng, 1.0)).unwrap();
     let mut tree = KineticTree::of_points(0.0, (0..1000).map(|_| plan(0.0)).collect::<Vec<_>>()).unwrap();

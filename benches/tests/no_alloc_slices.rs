@@ -1,4 +1,7 @@
 //! Tests of boxes against slices and steps of avatars allocate no memory.
+//!
+//! This is a program without a test harness because the counter covers the whole process.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::Aabb;
 use nearmiss::slices::{
@@ -10,8 +13,7 @@ use nearmiss_testdata::house::{STAIRS, STOREY, house, scanned};
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
 
-#[test]
-fn boxes_and_steps_ask_for_no_memory() {
+fn main() {
     let points = scanned(&house(), 0.05, 0.003, 1);
     let options = SliceOptions::default().with_pixel(Pixel::Side(0.05));
     let plan = SlicePlan::new(&options, &Aabb::of(points.iter().copied())).unwrap();
