@@ -3,6 +3,7 @@
 pub(crate) mod answer;
 pub(crate) mod as_shape;
 pub(crate) mod between;
+pub(crate) mod candidates;
 pub(crate) mod cast;
 pub(crate) mod closest;
 pub(crate) mod contacts;

@@ -17,10 +17,11 @@ use nearmiss_lanes::id32;
 use crate::ask::options::Detail;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
+use crate::solid::candidates::{Candidate, CandidateBlocks};
 use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
-use crate::solid::gather::{Candidate, Gather, Known, SPREAD};
+use crate::solid::gather::{Gather, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
 use crate::solid::place::{Place, place_at, place_beside};
 use crate::solid::probe::is_far;
@@ -41,10 +42,9 @@ const SLIDES: u32 = 3;
 /// Reusable memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Candidates {
-    found: Vec<Candidate>,
-    missed: Vec<Candidate>,
+    found: CandidateBlocks,
     places: Vec<Met>,
-    order: BinaryHeap<(u64, u32)>,
+    order: BinaryHeap<(u64, Candidate)>,
 }
 
 /// A contact, where it is in the stored frame, and the index and the local radius of its point.
@@ -60,16 +60,15 @@ struct Met {
 struct Selection<'s, 'a> {
     elements: &'s Elements<'a>,
     solid: &'s Solid<'s>,
-    found: &'s mut Vec<Candidate>,
+    level: Level,
+    found: &'s mut CandidateBlocks,
     places: &'s mut Vec<Met>,
-    /// Candidates that the shape is not over, and may be beside.
-    missed: &'s mut Vec<Candidate>,
     /// Candidates that are still to be looked at, by the number that matters.
-    order: &'s mut BinaryHeap<(u64, u32)>,
+    order: &'s mut BinaryHeap<(u64, Candidate)>,
     taken: [Option<Met>; MOST],
     count: usize,
     /// The furthest candidate from all contacts, until it is looked at.
-    next: Option<usize>,
+    next: Option<Candidate>,
     /// `true` if `order` has the others.
     is_ordered: bool,
 }
@@ -88,23 +87,22 @@ pub(crate) fn contacts(
         let own = hint.as_deref().and_then(|hint| hint.centre);
         let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
         let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
-        let Candidates { found, missed, places, order } = candidates;
+        let Candidates { found, places, order } = candidates;
         found.clear();
-        missed.clear();
         places.clear();
         if !is_far(elements, solid) {
             let mut near = Near::new(elements, solid, false);
             near.limit(elements.margin);
             let starts = elements.starts(solid, elements.margin);
-            let search = &mut Gather { near, sides: &sides, found: &mut *found, missed: &mut *missed };
+            let search = &mut Gather { near, sides: &sides, found: &mut *found };
             // The visitor never breaks.
             let _whole = near.descend(level, &starts, search);
         }
         let mut selection = Selection {
             elements,
             solid,
+            level,
             found,
-            missed,
             places,
             order,
             taken: [None; MOST],
@@ -142,7 +140,7 @@ impl Selection<'_, '_> {
         // Behind a thin plate there is another surface, which would push the shape through.
         let deepest = match self.deepest(true) {
             Some(front) => {
-                self.found.retain(|it| !it.is_behind);
+                self.found.remove_behind();
                 Some(front)
             }
             None => self.deepest(false),
@@ -150,70 +148,63 @@ impl Selection<'_, '_> {
         match deepest {
             // A shape that touches has a contact.
             None => self.taken[0] = self.beside(),
-            Some(n) => {
-                self.take(n);
+            Some(number) => {
+                self.take(number);
                 for known in hint.into_iter().flat_map(ShapeHint::contacts_of_points) {
                     self.continue_from(known);
                 }
                 while self.count < MOST {
-                    let Some(n) = self.furthest() else { break };
-                    self.take(n);
+                    let Some(number) = self.furthest() else { break };
+                    self.take(number);
                 }
             }
         }
     }
 
-    /// The deepest contact of a shape that is only beside discs.
+    /// The deepest contact of a shape that is only beside discs: no candidate has a place.
     fn beside(&self) -> Option<Met> {
-        let places = self.missed.iter().chain(self.found.iter()).filter_map(|it| {
-            let (i, sign) = (it.i as usize, it.sign());
-            Some(Met::new(self.elements, i, &place_beside(self.elements, self.solid, i, sign)?))
+        let places = self.found.missed().filter_map(|it| {
+            let i = self.found.point(it);
+            let place = place_beside(self.elements, self.solid, i, self.found.sign(it))?;
+            Some(Met::new(self.elements, i, &place))
         });
         places.max_by(Met::deeper)
     }
 
-    /// Computes the place of a candidate.
-    fn place(&mut self, n: usize) -> Option<usize> {
-        let candidate = self.found[n];
-        match candidate.known {
-            Known::Place(number) => return Some(number as usize),
-            Known::Unusable => return None,
-            Known::Nothing => {}
+    /// Returns the number of the place of a candidate.
+    fn place(&mut self, candidate: Candidate) -> Option<usize> {
+        if let Some(number) = self.found.place(candidate) {
+            return Some(number);
         }
-        let i = candidate.i as usize;
-        let Some(place) = place_at(self.elements, self.solid, i, candidate.sign()) else {
-            self.found[n].known = Known::Unusable;
+        let i = self.found.point(candidate);
+        let Some(place) = place_at(self.elements, self.solid, i, self.found.sign(candidate)) else {
+            self.found.miss(candidate);
             return None;
         };
         let number = self.places.len();
         self.places.push(Met::new(self.elements, i, &place));
-        self.found[n].known = Known::Place(id32(number));
+        self.found.set_place(candidate, number);
         Some(number)
-    }
-
-    /// Sets the order of the candidates that `is_wanted`: the greatest `number` first. O(n).
-    fn set_order(&mut self, is_wanted: impl Fn(&Candidate) -> bool, number: impl Fn(&Candidate) -> f32) {
-        let mut all = std::mem::take(self.order).into_vec();
-        all.clear();
-        let wanted = self.found.iter().enumerate().filter(|(_, it)| is_wanted(it));
-        all.extend(wanted.map(|(n, it)| (it.key(number(it)), id32(n))));
-        *self.order = BinaryHeap::from(all);
     }
 
     /// Returns the number of the deepest place, up to [`LEVEL`], of those before or behind the surface.
     /// Computes places as long as another one may be deeper.
     fn deepest(&mut self, is_front: bool) -> Option<usize> {
-        self.set_order(|it| it.is_behind != is_front, |it| it.most);
-        let mut best: Option<usize> = None;
-        while let Some((_, n)) = self.order.pop() {
-            let n = n as usize;
-            if let Some(best) = best
-                && let Met { contact, band, .. } = &self.places[best]
-                && contact.depth + LEVEL * band >= f64::from(self.found[n].most) * self.elements.scale()
-            {
+        let first = self.found.deepest(self.level, is_front)?;
+        let mut best = self.place(first);
+        let enough = |places: &[Met], best: usize| {
+            let Met { contact, band, .. } = &places[best];
+            (contact.depth + LEVEL * band) / self.elements.scale()
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "compared once more below")]
+        let least = best.map_or(f32::NEG_INFINITY, |best| (enough(self.places, best) as f32).next_down());
+        self.order.clear();
+        self.order.extend(self.found.deeper(is_front, least));
+        while let Some((_, candidate)) = self.order.pop() {
+            if best.is_some_and(|best| enough(self.places, best) >= self.found.most(candidate)) {
                 break;
             }
-            if let Some(own) = self.place(n)
+            if let Some(own) = self.place(candidate)
                 && best.is_none_or(|best| self.places[best].deeper(&self.places[own]) == Ordering::Less)
             {
                 best = Some(own);
@@ -229,26 +220,20 @@ impl Selection<'_, '_> {
         if self.count == MOST || taken().any(|own| ShapeHint::continues(known, &own.contact, own.band)) {
             return;
         }
-        let at = Vector::from(self.elements.placed.stored_to_world().apply_inverse(known.point));
+        let at = self.elements.placed.stored_to_world().apply_inverse(known.point);
+        let at = single(at.into());
         let mut tried = [u32::MAX; TRIES];
         for attempt in 0..TRIES {
-            let away_sq = |it: &Candidate| {
-                let is_same = it.i as usize == point;
-                if is_same { 0.0 } else { (Vector::from(it.centre.map(f64::from)) - at).norm_squared() }
-            };
-            let all = self.found.iter().enumerate();
-            let all = all.filter(|(_, it)| !tried.contains(&it.i) && it.known != Known::Unusable);
-            let all = all.map(|(n, it)| (away_sq(it), n));
-            let nearest = all
-                .min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| self.found[a.1].i.cmp(&self.found[b.1].i)));
-            let Some((away_sq, n)) = nearest else { return };
-            tried[attempt] = self.found[n].i;
+            let own = self.found.of_point(point).filter(|_| attempt == 0).map(|candidate| (0.0, candidate));
+            let nearest = own.or_else(|| self.found.nearest(self.level, at, &tried[..attempt]));
+            let Some((away_sq, candidate)) = nearest else { return };
+            tried[attempt] = id32(self.found.point(candidate));
             // A place is within its disc, whose radius is at most the local radius.
             let band = self.elements.band(tried[attempt] as usize);
-            if away_sq.sqrt() * self.elements.scale() > 2.0 * band {
+            if f64::from(away_sq.sqrt()) * self.elements.scale() > 2.0 * band {
                 return;
             }
-            if let Some(own) = self.place(n)
+            if let Some(own) = self.place(candidate)
                 && ShapeHint::continues(known, &self.places[own].contact, band)
                 && self.is_free(own)
             {
@@ -261,21 +246,22 @@ impl Selection<'_, '_> {
     /// Returns the number of the place of the furthest disc or ball from all contacts.
     fn furthest(&mut self) -> Option<usize> {
         loop {
-            let n = match self.next.take() {
-                Some(n) => n,
+            let candidate = match self.next.take() {
+                Some(candidate) => candidate,
                 None => {
                     if !self.is_ordered {
-                        self.set_order(|it| it.known != Known::Unusable, |it| it.away_sq);
+                        self.order.clear();
+                        self.order.extend(self.found.by_distance());
                         self.is_ordered = true;
                     }
-                    self.order.pop()?.1 as usize
+                    self.order.pop()?.1
                 }
             };
-            if let Some(own) = self.place(n) {
+            if let Some(own) = self.place(candidate) {
                 if self.is_free(own) {
                     return Some(own);
                 }
-                self.found[n].known = Known::Unusable;
+                self.found.remove(candidate);
             }
         }
     }
@@ -292,26 +278,14 @@ impl Selection<'_, '_> {
         let met = self.places[own];
         self.taken[self.count] = Some(met);
         self.count += 1;
-        #[expect(clippy::cast_possible_truncation, reason = "as precise as the positions")]
-        let at = [0, 1, 2].map(|k| met.at[k] as f32);
-        (self.next, self.is_ordered) = (None, false);
-        let (mut kept, mut greatest, mut next) = (0, 0, 0);
-        // Without branches, as it is not predictable which candidates are kept.
-        for n in 0..self.found.len() {
-            let mut other = self.found[n];
-            let [x, y, z] = [other.centre[0] - at[0], other.centre[1] - at[1], other.centre[2] - at[2]];
-            other.away_sq = other.away_sq.min(x * x + y * y + z * z);
-            let is_apart = (other.away_sq >= other.apart_sq) & (other.i as usize != met.i);
-            let is_kept = is_apart & (other.known != Known::Unusable);
-            self.found[kept] = other;
-            let key = if is_kept { other.key(other.away_sq) } else { 0 };
-            next = if key > greatest { kept } else { next };
-            greatest = greatest.max(key);
-            kept += usize::from(is_kept);
-        }
-        self.found.truncate(kept);
-        self.next = (greatest > 0).then_some(next);
+        self.next = self.found.separate(self.level, single(met.at), met.i);
+        self.is_ordered = false;
     }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "as precise as the positions")]
+fn single(at: Vector) -> [f32; 3] {
+    [at.x as f32, at.y as f32, at.z as f32]
 }
 
 impl Met {

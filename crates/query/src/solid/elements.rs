@@ -4,8 +4,10 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{ClearanceGrid, LeafBlock, NodeGrid, Part, SLAB, ScanArrays, Starts, THICKNESS};
-use nearmiss_lanes::wide::bits;
+use nearmiss_hierarchy::{
+    ClearanceGrid, LeafBlock, NodeGrid, Part, PointKind, SLAB, ScanArrays, Starts, THICKNESS,
+};
+use nearmiss_lanes::wide::{Bits, bits};
 
 use crate::ask::answer::Evidence;
 use crate::ask::options::{Detail, Semantics};
@@ -160,6 +162,39 @@ impl<'a> Elements<'a> {
 
     pub(crate) fn position(&self, i: usize) -> Vector {
         self.arrays.position(i).map(f64::from).into()
+    }
+
+    /// The positions of `count` points, at most sixteen, in lanes.
+    #[inline(always)]
+    pub(crate) fn positions(&self, first: usize, count: usize) -> [[f32; WIDTH]; 3] {
+        if first.is_multiple_of(WIDTH) {
+            return self.arrays.blocks[first / WIDTH].position;
+        }
+        let mut positions = [[0.0; WIDTH]; 3];
+        for lane in 0..count {
+            for (k, x) in self.arrays.position(first + lane).into_iter().enumerate() {
+                positions[k][lane] = x;
+            }
+        }
+        positions
+    }
+
+    /// The local radii of `count` points, at most sixteen, in the stored frame.
+    #[inline(always)]
+    pub(crate) fn local_radii<S: Simd>(&self, simd: S, first: usize, count: usize) -> f32x16<S> {
+        let of = &self.arrays.radii[first..first + count];
+        if let Ok(radii) = of.try_into() {
+            return f32x16::load_array_ref(simd, radii);
+        }
+        let mut radii = [0.0; WIDTH];
+        radii[..count].copy_from_slice(of);
+        f32x16::load_array_ref(simd, &radii)
+    }
+
+    /// Those of `lanes`, from the point `first` on, whose points are at an edge.
+    pub(crate) fn edges(&self, first: usize, lanes: u32) -> u32 {
+        let is_edge = |lane: usize| self.placed.scan().kind(first + lane) == PointKind::Edge;
+        Bits(lanes).fold(0, |edges, lane| edges | u32::from(is_edge(lane)) << lane)
     }
 
     pub(crate) fn normal(&self, i: usize) -> Vector {

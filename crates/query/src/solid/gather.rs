@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{LeafBlock, PlaceVisitor, PointKind, Siblings, THICKNESS};
-use nearmiss_lanes::id32;
+use nearmiss_hierarchy::{LeafBlock, PlaceVisitor, Siblings, THICKNESS};
 use nearmiss_lanes::wide::{Bits, along, bits, product};
 
 use crate::ask::options::Semantics;
+use crate::solid::candidates::{CandidateBlock, CandidateBlocks, CandidateLanes};
 use crate::solid::depths::LaneDiscs;
 use crate::solid::descent::Near;
 use crate::solid::elements::{Element, Elements, Measured};
@@ -18,61 +18,14 @@ use crate::solid::sides::Sides;
 /// Two contacts of a manifold are at least this far apart, in local radii.
 pub(crate) const SPREAD: f32 = 0.5;
 
-/// The state of the place of a candidate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Known {
-    Nothing,
-    /// The number of its place.
-    Place(u32),
-    /// It has no place, or one that is near a contact.
-    Unusable,
-}
-
 /// The error of a component of a stored normal.
 const NORMAL: f32 = 1e-4;
-
-/// A disc or ball that the shape may touch.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Candidate {
-    /// Its centre, in the stored frame.
-    pub(crate) centre: [f32; 3],
-    /// The index of the point.
-    pub(crate) i: u32,
-    /// An upper bound on the depth, in the stored frame.
-    pub(crate) most: f32,
-    /// `true` if the normal of the disc is opposite to the direction in which the shape moves out.
-    pub(crate) is_turned: bool,
-    /// `true` if the shape is behind the surface.
-    pub(crate) is_behind: bool,
-    pub(crate) known: Known,
-    /// The squared distance from the nearest contact that was selected.
-    pub(crate) away_sq: f32,
-    /// It gives another contact from this squared distance on.
-    pub(crate) apart_sq: f32,
-}
-
-impl Candidate {
-    /// A key that orders candidates by this number, and equal ones by their points, the first one last.
-    pub(crate) fn key(&self, number: f32) -> u64 {
-        // The bits of floats in their order.
-        let bits = number.to_bits();
-        let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
-        u64::from(ordered) << 32 | u64::from(!self.i)
-    }
-
-    /// The sign of the normal of the disc in the direction in which the shape moves out.
-    pub(crate) fn sign(&self) -> f64 {
-        if self.is_turned { -1.0 } else { 1.0 }
-    }
-}
 
 /// The search for candidates.
 pub(crate) struct Gather<'s, 'a> {
     pub(crate) near: Near<'s, 'a>,
     pub(crate) sides: &'s Sides,
-    pub(crate) found: &'s mut Vec<Candidate>,
-    /// Candidates that no part of the shape within the margin is over.
-    pub(crate) missed: &'s mut Vec<Candidate>,
+    pub(crate) found: &'s mut CandidateBlocks,
 }
 
 /// The points of a block of a leaf that may touch, and on which side of them the shape is, as bits.
@@ -113,8 +66,7 @@ impl Gather<'_, '_> {
         let parts = elements.parts(simd, leaf, part, false);
         let Measured { distances, tilt, .. } = Measured::new(simd, &lane_box, block);
         let gaps = distances.from(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
-        let gaps = gaps.to_array();
-        let lanes = Elements::within(simd, (&gaps, count), most);
+        let lanes = Elements::within(simd, (&gaps.to_array(), count), most);
         if lanes == 0 {
             return;
         }
@@ -144,26 +96,20 @@ impl Gather<'_, '_> {
         let of_discs = lane_box.depths(simd, &of_discs, radius);
         let is_in: mask32x16<S> = distances.from_point.simd_le(tilt);
         let of_balls = is_in.select(none, parts.radii + radius - distances.from_point + tilt);
-        let depths = parts.discs.select(of_discs, of_balls).to_array();
+        let depths = parts.discs.select(of_discs, of_balls);
+        let edges = elements.edges(first, turned.lanes);
+        let is_edge = mask32x16::from_bitmask(simd, u64::from(edges));
+        // Beside a border, the depth is along the way to the border.
+        let depths = is_edge.select(depths.max(radius - gaps), depths);
         #[expect(clippy::cast_possible_truncation, reason = "depths are rounded more")]
-        let least = (parts.radii * -THICKNESS).min(-elements.margin as f32).to_array();
-        for lane in Bits(turned.lanes) {
-            let (i, bit) = (first + lane, 1 << lane);
-            let is_edge = elements.placed.scan().kind(i) == PointKind::Edge;
-            // Beside a border, the depth is along the way to the border.
-            let depth = if is_edge { depths[lane].max(radius - gaps[lane]) } else { depths[lane] };
-            let list = if depth < least[lane] { &mut *self.missed } else { &mut *self.found };
-            list.push(Candidate {
-                centre: elements.arrays.position(i),
-                i: id32(i),
-                most: depth,
-                is_turned: turned.turned & bit != 0,
-                is_behind: turned.behind & bit != 0,
-                known: Known::Nothing,
-                away_sq: f32::INFINITY,
-                apart_sq: (SPREAD * elements.arrays.radii[i]).powi(2),
-            });
-        }
+        let least = (parts.radii * -THICKNESS).min(-elements.margin as f32);
+        let is_missed: mask32x16<S> = depths.simd_lt(least);
+        let missed = turned.lanes & bits(is_missed);
+        let Turned { lanes, turned, behind, .. } = turned;
+        let lanes = CandidateLanes { found: lanes & !missed, missed, turned, behind };
+        let apart = elements.local_radii(simd, first, count) * SPREAD;
+        let centres = elements.positions(first, count);
+        self.found.push(CandidateBlock::new(first, lanes, centres, [depths, apart]));
     }
 }
 
