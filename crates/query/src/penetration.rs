@@ -7,6 +7,7 @@
 
 pub(crate) mod answer;
 pub(crate) mod apart;
+pub(crate) mod cover;
 mod deepest;
 pub(crate) mod interior;
 pub(crate) mod probe;

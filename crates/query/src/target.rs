@@ -267,7 +267,7 @@ impl<'a> Target<'a> {
         let shape = self.solid(shape).filter(|_| self.is_proper);
         let (level, Scratch { contact, solid, penetration: own, .. }) = (scratch.level(), scratch);
         let working = (level, &mut contact.gathers[0], solid);
-        penetration(&elements, shape.as_ref(), (interior, budget), working, &mut own.survey)
+        penetration(&elements, shape.as_ref(), (interior, budget), working, &mut own.search)
     }
 
     fn solid<'s>(&'s self, shape: &Shape<'s>) -> Option<Solid<'s>> {

@@ -18,7 +18,7 @@ use crate::mesh::solid::MeshSolid;
 use crate::mesh::time_critical;
 use crate::pair::cell_table::{CellTable, MOST_SHARED};
 use crate::penetration::answer::Penetration;
-use crate::penetration::survey::ContactSurvey;
+use crate::penetration::search::SearchScratch;
 
 /// Working memory of queries about meshes, one per thread. Reuse it: a query does not allocate once
 /// its scratch is warm. It holds no answers and never changes one.
@@ -31,7 +31,7 @@ pub struct MeshScratch {
     /// The pairs that are open when a time-critical search stops.
     left: Vec<Open>,
     table: Option<CellTable>,
-    penetration: ContactSurvey,
+    penetration: SearchScratch,
 }
 
 impl Default for MeshScratch {
@@ -52,7 +52,7 @@ impl MeshScratch {
             heap: Heap::default(),
             left: Vec::new(),
             table: None,
-            penetration: ContactSurvey::default(),
+            penetration: SearchScratch::default(),
         }
     }
 
@@ -62,7 +62,7 @@ impl MeshScratch {
     }
 
     /// The memory of a penetration.
-    pub(crate) fn of_penetration(&mut self) -> (Level, &mut Stack, &mut ContactSurvey) {
+    pub(crate) fn of_penetration(&mut self) -> (Level, &mut Stack, &mut SearchScratch) {
         (self.level, &mut self.stack, &mut self.penetration)
     }
 }

@@ -22,7 +22,7 @@ use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{
     contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
 };
-use crate::penetration::probe::{Deep, Probe, SLACK};
+use crate::penetration::probe::{Deep, Probe, SLACK, deep_in_solids};
 use crate::penetration::scans::{PenetrationScratch, Piece};
 use crate::penetration::search::search;
 use crate::penetration::survey::{ContactSurvey, way_out};
@@ -81,7 +81,7 @@ pub(crate) fn of_pieces<'s>(
     let of_shapes = ShapePlan::of_pair(plan.options());
     let (elements, whole_scan) = (Elements::new(scan, &of_shapes), Elements::new(whole, &of_shapes));
     let (view, whole_view) = (mesh.part.mesh().arrays(), mesh.whole.arrays());
-    let PenetrationScratch { survey, contacts } = scratch;
+    let PenetrationScratch { search: memory, contacts } = scratch;
     let mut probe = MeshScanProbe {
         scan,
         elements,
@@ -98,7 +98,7 @@ pub(crate) fn of_pieces<'s>(
         spent: Statistics::default(),
     };
     let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
-    let bounds = search(&mut probe, out, survey);
+    let bounds = search(&mut probe, out, memory);
     let answer = probe.collide_with(bounds.shift, plan, None, &Budget::UNLIMITED);
     let evidence = match answer.verdict {
         Verdict::Separated { evidence, .. } => evidence,
@@ -175,26 +175,34 @@ impl<'s> MeshScanProbe<'s> {
 
     /// Measures how deep a place is in both, of which some are solid. The place is moved to the nearest point
     /// of one that is not: a measured one of the scan, any one of the mesh.
-    fn deep_in(&mut self, place: Vector, [is_scan_solid, is_mesh_solid]: [bool; 2]) -> Option<Deep> {
-        let mut found = Deep { place, depth: self.plan.options().margin, uphill: Vector::zeros() };
+    fn deep_in(
+        &mut self,
+        place: Vector,
+        t: Vector,
+        [is_scan_solid, is_mesh_solid]: [bool; 2],
+    ) -> Option<Deep> {
+        let margin = self.plan.options().margin;
+        let mut found = Deep { place, depth: margin, in_a: 0.0, uphill: Vector::zeros() };
         if !is_scan_solid {
             let (point, radius) = world_nearest_point(&self.elements, &found.place)?;
             found.place = point;
             found.depth += radius;
+            found.in_a = radius;
         }
         let (mesh, level) = (self.mesh.part, self.contact.level);
         if !is_mesh_solid {
-            let own = mesh.pose().apply_inverse(found.place.into());
-            found.place = mesh.pose().apply(foot(mesh.mesh(), self.view, level, own)).into();
+            let own = mesh.pose().apply_inverse((found.place - t).into());
+            found.place = t + Vector::from(mesh.pose().apply(foot(mesh.mesh(), self.view, level, own)));
         }
         if is_scan_solid {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
             let (depth, uphill) = world_depth_in(&self.whole_scan, &found.place, working)?;
             found.depth += depth;
+            found.in_a = depth;
             found.uphill += uphill;
         }
         if is_mesh_solid {
-            let (depth, uphill) = depth_in_solid(&self.solid_view(), &mesh, found.place)?;
+            let (depth, uphill) = depth_in_solid(&self.solid_view(), &mesh, found.place - t)?;
             found.depth += depth;
             found.uphill += uphill;
         }
@@ -230,19 +238,14 @@ impl Probe for MeshScanProbe<'_> {
         if is_cut_short { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
         if self.are_solid == [false; 2] {
             return ControlFlow::Continue(None);
         }
         self.budget.go_on(self.spent.work())?;
         self.spent.evaluations += 1;
-        let mut found = self.deep_in(place, self.are_solid);
-        if self.are_solid == [true; 2] {
-            // A solid may be too thin for a place inside to be hit; its surface counts as well.
-            found = found.or_else(|| self.deep_in(place, [true, false]));
-            found = found.or_else(|| self.deep_in(place, [false, true]));
-        }
-        ControlFlow::Continue(found)
+        let are_solid = self.are_solid;
+        ControlFlow::Continue(deep_in_solids(are_solid, |solid| self.deep_in(place, t, solid)))
     }
 
     fn centres(&self) -> [Vector; 2] {

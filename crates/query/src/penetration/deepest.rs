@@ -11,15 +11,15 @@ use crate::penetration::probe::{Deep, Probe, Vector};
 /// Steps of a search from one place at most.
 const STEPS: usize = 24;
 
-/// Searches for a deeper place than `best` by steps of up to `step`, and raises `lower` to its depth. Stops
-/// at `enough`. Breaks if the budget is spent.
+/// Searches for a deeper place than `best` without a shift, by steps of up to `step`, and raises `lower` to
+/// its depth. Stops at `enough`. Breaks if the budget is spent.
 pub(crate) fn climb<P: Probe>(
     probe: &mut P,
     mut best: Deep,
     mut step: f64,
     enough: f64,
     lower: &mut f64,
-) -> ControlFlow<()> {
+) -> ControlFlow<(), Deep> {
     let rounding = probe.rounding();
     let finest = step / 64.0;
     for _ in 0..STEPS {
@@ -32,7 +32,7 @@ pub(crate) fn climb<P: Probe>(
         let mut moved = false;
         for way in uphill.into_iter().chain(axes) {
             let deeper = |found: &Deep| found.depth > best.depth * (1.0 + 1e-6);
-            if let Some(found) = probe.deep(best.place + way * step)?.filter(deeper) {
+            if let Some(found) = probe.deep(best.place + way * step, Vector::zeros())?.filter(deeper) {
                 (best, moved) = (found, true);
                 break;
             }
@@ -41,5 +41,5 @@ pub(crate) fn climb<P: Probe>(
             step *= 0.5;
         }
     }
-    ControlFlow::Continue(())
+    ControlFlow::Continue(best)
 }

@@ -16,10 +16,28 @@ pub(crate) const SLACK: f64 = 0.4;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Deep {
     pub(crate) place: Vector,
-    /// A shift by less than this leaves the things in contact.
+    /// A further shift by less than this leaves the things in contact.
     pub(crate) depth: f64,
+    /// The part of `depth` that is the depth in a.
+    pub(crate) in_a: f64,
     /// The direction in which `depth` grows, of any length.
     pub(crate) uphill: Vector,
+}
+
+/// Measures how deep a place is in both things by `deep`, which is told which of them count as solids; those
+/// of the others that count are points of their surfaces. A solid may be too thin for a place inside to be
+/// hit, so its surface counts as well. `None` for two surfaces.
+pub(crate) fn deep_in_solids(
+    are_solid: [bool; 2],
+    mut deep: impl FnMut([bool; 2]) -> Option<Deep>,
+) -> Option<Deep> {
+    match are_solid {
+        [false, false] => None,
+        [true, true] => {
+            deep([true; 2]).or_else(|| deep([true, false])).or_else(|| deep([false, true]))
+        }
+        one => deep(one),
+    }
 }
 
 /// Two things a and b, and tests of them with b shifted. Each test breaks if the budget ended it.
@@ -34,9 +52,9 @@ pub(crate) trait Probe {
     /// Finds all contacts without a shift.
     fn survey(&mut self, survey: &mut ContactSurvey) -> ControlFlow<()>;
 
-    /// Measures how deep a place is in both things without a shift; `None` if it is outside one of them. The
+    /// Measures how deep a place is in both things after a shift; `None` if it is outside one of them. The
     /// place may be replaced by one nearby.
-    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>>;
+    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>>;
 
     /// The centres of both things.
     fn centres(&self) -> [Vector; 2];

@@ -13,8 +13,8 @@ use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{
     TESTED, contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
 };
-use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
-use crate::penetration::search::search;
+use crate::penetration::probe::{Deep, Probe, SLACK, Vector, deep_in_solids};
+use crate::penetration::search::{SearchScratch, search};
 use crate::penetration::survey::{ContactSurvey, way_out};
 use crate::solid::cast::Crossing;
 use crate::solid::elements::Elements;
@@ -23,7 +23,7 @@ use crate::solid::plan::ShapePlan;
 /// Reusable memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PenetrationScratch {
-    pub(crate) survey: ContactSurvey,
+    pub(crate) search: SearchScratch,
     pub(crate) contacts: Contacts,
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn of_pieces<'s>(
     let elements = scans.map(|scan| Elements::new(scan, &of_shapes));
     let wholes = pieces.map(|piece| Elements::new(piece.whole, &of_shapes));
     let solid = [0, 1].map(|k: usize| counts(&elements[k], interiors[k]));
-    let PenetrationScratch { survey, contacts } = scratch;
+    let PenetrationScratch { search: memory, contacts } = scratch;
     let mut probe = ScanProbe {
         scans,
         elements,
@@ -100,7 +100,7 @@ pub(crate) fn of_pieces<'s>(
         spent: Statistics::default(),
     };
     let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
-    let bounds = search(&mut probe, out, survey);
+    let bounds = search(&mut probe, out, memory);
     let answer = probe.collide_with(bounds.shift, plan, Outputs::default(), &Budget::UNLIMITED);
     let evidence = match answer.verdict {
         Verdict::Separated { evidence, .. } => evidence,
@@ -170,17 +170,21 @@ impl ScanProbe<'_> {
 
     /// Measures how deep a place is in both scans, of which some are solid. The place is moved to the nearest
     /// measured point of one that is not.
-    fn deep_in(&mut self, place: Vector, solid: [bool; 2]) -> Option<Deep> {
-        let mut found = Deep { place, depth: self.plan.options().margin, uphill: Vector::zeros() };
+    fn deep_in(&mut self, place: Vector, t: Vector, solid: [bool; 2]) -> Option<Deep> {
+        let shifts = [Vector::zeros(), t];
+        let margin = self.plan.options().margin;
+        let mut found = Deep { place, depth: margin, in_a: 0.0, uphill: Vector::zeros() };
         for k in (0..2).filter(|&k| !solid[k]) {
-            let (point, radius) = world_nearest_point(&self.elements[k], &found.place)?;
-            found.place = point;
+            let (point, radius) = world_nearest_point(&self.elements[k], &(found.place - shifts[k]))?;
+            found.place = point + shifts[k];
             found.depth += radius;
+            found.in_a += if k == 0 { radius } else { 0.0 };
         }
         for k in (0..2).filter(|&k| solid[k]) {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
-            let (depth, uphill) = world_depth_in(&self.wholes[k], &found.place, working)?;
+            let (depth, uphill) = world_depth_in(&self.wholes[k], &(found.place - shifts[k]), working)?;
             found.depth += depth;
+            found.in_a += if k == 0 { depth } else { 0.0 };
             found.uphill += uphill;
         }
         Some(found)
@@ -222,20 +226,14 @@ impl Probe for ScanProbe<'_> {
         if is_cut_short { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
         if self.solid == [false; 2] {
             return ControlFlow::Continue(None);
         }
         self.go_on()?;
         self.spent.evaluations += 1;
-        let found = self.deep_in(place, self.solid);
-        // A thin solid is not thick enough to be hit; its points count as those of a surface.
-        let of_one = |probe: &mut Self, own: [bool; 2]| {
-            let both = probe.solid == [true; 2];
-            if both { probe.deep_in(place, own) } else { None }
-        };
-        let found = found.or_else(|| of_one(self, [true, false])).or_else(|| of_one(self, [false, true]));
-        ControlFlow::Continue(found)
+        let are_solid = self.solid;
+        ControlFlow::Continue(deep_in_solids(are_solid, |solid| self.deep_in(place, t, solid)))
     }
 
     fn centres(&self) -> [Vector; 2] {

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::penetration::cover::{Cover, cover};
 use crate::penetration::deepest::climb;
 use crate::penetration::probe::{Deep, Probe, Vector};
 use crate::penetration::survey::{ContactSurvey, KEPT};
@@ -17,9 +18,20 @@ pub(crate) struct Bounds {
     pub(crate) complete: bool,
 }
 
+/// Reusable memory of a search.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SearchScratch {
+    contacts: ContactSurvey,
+    cover: Cover,
+}
+
 /// Bounds the least shift that separates two things. `out` is any shift that does.
-pub(crate) fn search<P: Probe>(probe: &mut P, out: Vector, contacts: &mut ContactSurvey) -> Bounds {
-    let mut search = Search { probe, contacts, best: Shift::new(out), lower: 0.0 };
+pub(crate) fn search<P: Probe>(
+    probe: &mut P,
+    out: Vector,
+    SearchScratch { contacts, cover }: &mut SearchScratch,
+) -> Bounds {
+    let mut search = Search { probe, contacts, cover, best: Shift::new(out), lower: 0.0, deepest: None };
     let flow = match search.probe.is_apart(Vector::zeros()) {
         ControlFlow::Continue(true) => {
             return Bounds { lower: 0.0, shift: Vector::zeros(), complete: true };
@@ -86,10 +98,13 @@ const CLIMBS: usize = 2;
 struct Search<'p, P> {
     probe: &'p mut P,
     contacts: &'p mut ContactSurvey,
+    cover: &'p mut Cover,
     /// The best shift so far.
     best: Shift,
     /// The greatest lower bound so far.
     lower: f64,
+    /// The deepest place so far.
+    deepest: Option<Deep>,
 }
 
 impl<P: Probe> Search<'_, P> {
@@ -110,7 +125,11 @@ impl<P: Probe> Search<'_, P> {
         self.bisect(FINE)?;
         self.settle()?;
         self.lengthen()?;
-        self.raise()
+        self.raise()?;
+        let Some(deepest) = self.deepest else { return ControlFlow::Continue(()) };
+        let shift = self.best.way * self.best.meets;
+        let last = self.probe.touch(shift)?.map(|(place, _)| (shift, place));
+        cover(self.probe, (&deepest, last), self.enough(), (self.cover, &mut self.lower))
     }
 
     /// Lengthens the shift a little if a longer one, by rounding, does not separate the things.
@@ -238,16 +257,21 @@ impl<P: Probe> Search<'_, P> {
         ControlFlow::Continue(())
     }
 
+    /// A lower bound that need not be raised.
+    fn enough(&self) -> f64 {
+        (self.best.length * (1.0 - 2.0 * FINE)).min(self.best.length - self.probe.slack())
+    }
+
     /// Raises the lower bound, from the deepest of some places.
     fn raise(&mut self) -> ControlFlow<()> {
-        let enough = (self.best.length * (1.0 - 2.0 * FINE)).min(self.best.length - self.probe.slack());
+        let enough = self.enough();
         if self.lower >= enough {
             return ControlFlow::Continue(());
         }
         let mut deepest: [Option<Deep>; CLIMBS] = [None; CLIMBS];
         let (starts, count) = self.starts()?;
         for &start in &starts[..count] {
-            let Some(mut found) = self.probe.deep(start)? else { continue };
+            let Some(mut found) = self.probe.deep(start, Vector::zeros())? else { continue };
             for kept in &mut deepest {
                 match kept {
                     Some(kept) if kept.depth >= found.depth => {}
@@ -261,7 +285,10 @@ impl<P: Probe> Search<'_, P> {
         }
         let step = 0.125 * self.best.length;
         for start in deepest.into_iter().flatten() {
-            climb(self.probe, start, step, enough, &mut self.lower)?;
+            let found = climb(self.probe, start, step, enough, &mut self.lower)?;
+            if self.deepest.is_none_or(|deepest| deepest.depth < found.depth) {
+                self.deepest = Some(found);
+            }
         }
         ControlFlow::Continue(())
     }

@@ -11,7 +11,7 @@ use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{counts, depth_in, is_inside, nearest_point};
 use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
-use crate::penetration::search::search;
+use crate::penetration::search::{SearchScratch, search};
 use crate::penetration::survey::ContactSurvey;
 use crate::solid::answer::{ShapeAnswer, ShapeVerdict};
 use crate::solid::contacts::contacts;
@@ -38,15 +38,15 @@ pub(crate) fn penetration(
     elements: &Elements<'_>,
     solid: Option<&Solid<'_>>,
     (interior, budget): (Interior, &Budget),
-    (level, scratch, memory): (Level, &mut ViewScratch, &mut SolidScratch),
-    survey: &mut ContactSurvey,
+    (level, scratch, solids): (Level, &mut ViewScratch, &mut SolidScratch),
+    memory: &mut SearchScratch,
 ) -> Penetration {
     let Some(solid) = solid else { return Penetration::UNKNOWN };
     let is_solid = counts(elements, interior);
     let (budget, spent) = (*budget, Statistics::default());
-    let mut probe = ShapeProbe { elements, solid, is_solid, budget, level, scratch, memory, spent };
+    let mut probe = ShapeProbe { elements, solid, is_solid, budget, level, scratch, memory: solids, spent };
     let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
-    let bounds = search(&mut probe, out, survey);
+    let bounds = search(&mut probe, out, memory);
     let answer = probe.touch_at(bounds.shift);
     let evidence = match answer.verdict {
         ShapeVerdict::Separated { evidence } => evidence,
@@ -117,10 +117,10 @@ impl Probe for ShapeProbe<'_, '_> {
 
     /// The place is moved to the nearest measured point of a scan without inside, and to the core of a shape
     /// that is beside it.
-    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
         self.go_on()?;
         self.spent.evaluations += 1;
-        let (elements, solid) = (self.elements, self.solid);
+        let (elements, solid) = (self.elements, &self.solid.shifted(&t));
         let found = if self.is_solid {
             let (place, (own, uphill)) = match solid.depth(&place) {
                 Some(own) => (place, own),
@@ -130,6 +130,7 @@ impl Probe for ShapeProbe<'_, '_> {
             depth_in(elements, &place, working).map(|(depth, away)| Deep {
                 place,
                 depth: elements.margin + own + depth,
+                in_a: depth,
                 uphill: uphill + away,
             })
         } else {
@@ -139,7 +140,7 @@ impl Probe for ShapeProbe<'_, '_> {
                     (solid.radius - way.norm(), way.try_normalize(0.0).unwrap_or_else(Vector::zeros))
                 });
                 let depth = elements.margin + radius + own;
-                (depth > 0.0).then_some(Deep { place: point, depth, uphill })
+                (depth > 0.0).then_some(Deep { place: point, depth, in_a: radius, uphill })
             })
         };
         ControlFlow::Continue(found)

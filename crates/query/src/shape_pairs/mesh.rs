@@ -108,8 +108,8 @@ impl<'a> ShapeMeshPair<'a> {
     #[must_use]
     pub fn penetration(&self, parts: &MeshSolid, budget: &Budget, scratch: &mut Scratch) -> Penetration {
         let level = scratch.level();
-        let survey = &mut scratch.penetration.survey;
-        let found = self.ask(|solid| penetration(self.mesh, parts, solid, (budget, level), survey));
+        let search = &mut scratch.penetration.search;
+        let found = self.ask(|solid| penetration(self.mesh, parts, solid, (budget, level), search));
         found.unwrap_or(Penetration::UNKNOWN)
     }
 

@@ -14,7 +14,7 @@ use crate::mesh::solid::{MeshSolid, SolidView};
 use crate::penetration::answer::Penetration;
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::probe::{Deep, Probe, Vector};
-use crate::penetration::search::search;
+use crate::penetration::search::{SearchScratch, search};
 use crate::penetration::survey::ContactSurvey;
 use crate::shape_pairs::mesh_distance::visit_near;
 use crate::solid::core::Solid;
@@ -38,7 +38,7 @@ pub(crate) fn penetration(
     parts: &MeshSolid,
     solid: &Solid<'_>,
     (budget, level): (&Budget, Level),
-    survey: &mut ContactSurvey,
+    memory: &mut SearchScratch,
 ) -> Penetration {
     if !parts.is_of(mesh.mesh()) {
         return Penetration::UNKNOWN;
@@ -47,7 +47,7 @@ pub(crate) fn penetration(
     let (budget, spent) = (*budget, Statistics::default());
     let mut probe = ShapeMeshProbe { mesh, view: &view, parts, solid, budget, level, spent };
     let Some(out) = probe.out_of_balls() else { return Penetration::UNKNOWN };
-    let bounds = search(&mut probe, out, survey);
+    let bounds = search(&mut probe, out, memory);
     let placed = mesh.stored_to_world();
     let turned = |way: Vector| placed.rotate(way.into());
     Penetration::new(&bounds, (placed.scale(), turned), (Evidence::Certified, 0.0), probe.spent)
@@ -127,11 +127,10 @@ impl<'s> ShapeMeshProbe<'s> {
 
     /// Measures how deep a place is in the closed parts of the mesh and in the shape. A place beside the core
     /// is moved there.
-    fn deep_in_both(&self, place: Vector) -> Option<Deep> {
+    fn deep_in_both(&self, solid: &Solid<'_>, place: Vector) -> Option<Deep> {
         if !self.parts.is_closed() {
             return None;
         }
-        let solid = self.solid;
         let (place, (own, uphill)) = match solid.depth(&place) {
             Some(own) => (place, own),
             None => (solid.nearest(&place), (solid.radius, Vector::zeros())),
@@ -139,16 +138,17 @@ impl<'s> ShapeMeshProbe<'s> {
         let placed = self.mesh.stored_to_world();
         let (depth, away) = depth_in_solid(&self.solid_view(), &self.mesh, self.in_world(place))?;
         let away = Vector::from(placed.rotate_inverse(away.into()));
-        Some(Deep { place, depth: own + depth / placed.scale(), uphill: uphill + away })
+        let in_a = depth / placed.scale();
+        Some(Deep { place, depth: own + in_a, in_a, uphill: uphill + away })
     }
 
     /// Measures how deep the place of the mesh that is nearest to another one is in the shape.
-    fn deep_at_surface(&self, place: Vector) -> Option<Deep> {
+    fn deep_at_surface(&self, solid: &Solid<'_>, place: Vector) -> Option<Deep> {
         let on_mesh = foot(self.mesh.mesh(), self.view, self.level, self.in_input(place));
         let in_world = self.mesh.pose().apply(on_mesh);
         let place = Vector::from(self.mesh.stored_to_world().apply_inverse(in_world));
-        let (depth, uphill) = self.solid.depth(&place)?;
-        Some(Deep { place, depth, uphill })
+        let (depth, uphill) = solid.depth(&place)?;
+        Some(Deep { place, depth, in_a: 0.0, uphill })
     }
 }
 
@@ -189,12 +189,13 @@ impl Probe for ShapeMeshProbe<'_> {
         })
     }
 
-    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
+    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
         self.go_on()?;
         self.spent.evaluations += 1;
-        let found = self.deep_in_both(place);
+        let solid = &self.solid.shifted(&t);
+        let found = self.deep_in_both(solid, place);
         // A solid may be too thin for a place inside to be hit.
-        ControlFlow::Continue(found.or_else(|| self.deep_at_surface(place)))
+        ControlFlow::Continue(found.or_else(|| self.deep_at_surface(solid, place)))
     }
 
     fn centres(&self) -> [Vector; 2] {

@@ -120,7 +120,7 @@ impl<'a> ShapeScanPair<'a> {
         let working = (level, &mut contact.gathers[0], own);
         let found = self.ask(plan, |elements, solid| {
             let elements = elements.without_witness();
-            penetration(&elements, solid, (interior, budget), working, &mut memory.survey)
+            penetration(&elements, solid, (interior, budget), working, &mut memory.search)
         });
         found.unwrap_or(Penetration::UNKNOWN)
     }

@@ -51,8 +51,8 @@ impl MeshPair<'_> {
                 let [Some(a), Some(b)] = [0, 1].map(|k: usize| at[k].piece(&parts[k])) else {
                     return OfParts::Unknown;
                 };
-                let (level, stack, survey) = scratch.of_penetration();
-                OfParts::Found(of_pieces([a, b], self.budget(), (level, stack), survey))
+                let (level, stack, search) = scratch.of_penetration();
+                OfParts::Found(of_pieces([a, b], self.budget(), (level, stack), search))
             })
         })
     }

@@ -8,7 +8,7 @@ use nearmiss_hierarchy::{MeshView, Stack};
 use crate::ask::answer::Statistics;
 use crate::ask::budget::Budget;
 use crate::mesh::collide::first_met;
-use crate::mesh::foot::depth_in_solid;
+use crate::mesh::foot::{depth_in_solid, foot};
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::penetration::contacts::survey;
 use crate::mesh::penetration::piece::MeshPiece;
@@ -16,7 +16,7 @@ use crate::mesh::penetration::triangle_depth::triangle_depth;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::SolidView;
 use crate::penetration::apart::out_of_balls;
-use crate::penetration::probe::{Deep, Probe, Vector};
+use crate::penetration::probe::{Deep, Probe, Vector, deep_in_solids};
 use crate::penetration::survey::ContactSurvey;
 
 /// Two placed meshes, or parts of them, with their solids, and the cost of all tests so far. Shifts are
@@ -101,6 +101,27 @@ impl<'s> MeshProbe<'s> {
             })
         })
     }
+
+    /// Measures how deep a place is in both things, of which these count as solids. The place is moved to the
+    /// nearest point of a surface.
+    fn deep_in(&self, place: Vector, t: Vector, solid: [bool; 2]) -> Option<Deep> {
+        let shifts = [Vector::zeros(), t];
+        let mut found = Deep { place, depth: 0.0, in_a: 0.0, uphill: Vector::zeros() };
+        for k in (0..2).filter(|&k| !solid[k]) {
+            let part = self.pieces[k].part;
+            let own = part.pose().apply_inverse((found.place - shifts[k]).into());
+            let on_mesh = part.pose().apply(foot(part.mesh(), &self.views[k], self.level, own));
+            found.place = shifts[k] + Vector::from(on_mesh);
+        }
+        for k in (0..2).filter(|&k| solid[k]) {
+            let placed = &self.pieces[k].part;
+            let (depth, uphill) = depth_in_solid(self.solids[k].as_ref()?, placed, found.place - shifts[k])?;
+            found.depth += depth;
+            found.in_a += if k == 0 { depth } else { 0.0 };
+            found.uphill += uphill;
+        }
+        Some(found)
+    }
 }
 
 impl Probe for MeshProbe<'_> {
@@ -143,21 +164,14 @@ impl Probe for MeshProbe<'_> {
         flow
     }
 
-    fn deep(&mut self, place: Vector) -> ControlFlow<(), Option<Deep>> {
-        let [Some(a), Some(b)] = self.solids else { return ControlFlow::Continue(None) };
-        let meshes = self.meshes();
-        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
-        pair.meter.go_on()?;
-        self.spent.evaluations += 1;
-        let mut found = Deep { place, depth: 0.0, uphill: Vector::zeros() };
-        for (solid, placed) in [a, b].iter().zip(&meshes) {
-            let Some((depth, uphill)) = depth_in_solid(solid, placed, place) else {
-                return ControlFlow::Continue(None);
-            };
-            found.depth += depth;
-            found.uphill += uphill;
+    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
+        let are_solid = self.solids.map(|solid| solid.is_some());
+        if are_solid == [false; 2] {
+            return ControlFlow::Continue(None);
         }
-        ControlFlow::Continue(Some(found))
+        self.budget.go_on(self.spent.work())?;
+        self.spent.evaluations += 1;
+        ControlFlow::Continue(deep_in_solids(are_solid, |solid| self.deep_in(place, t, solid)))
     }
 
     fn centres(&self) -> [Vector; 2] {
