@@ -72,10 +72,7 @@ fn ask_all(
     verdicts
 }
 
-#[expect(
-    clippy::too_many_lines,
-    reason = "all tests share their scenes"
-)]
+#[expect(clippy::too_many_lines, reason = "all tests share their scenes")]
 fn main() {
     let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
     let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();

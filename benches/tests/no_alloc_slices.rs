@@ -32,6 +32,6 @@ fn main() {
         touched += usize::from(map.touches(&bounds).unwrap());
         touched += usize::from(map.query(&bounds, Floor::Mean).unwrap().floor.is_some());
     }
-    assert_eq!(ALLOCATOR.calls(), before);
+    assert_eq!(ALLOCATOR.calls(), before, "calls of the allocator");
     assert!((highest - STOREY).abs() < 0.02 && touched > 500, "{highest}, {touched}");
 }

@@ -110,7 +110,7 @@ pub(crate) fn cover<P: Probe>(
         }
         tried += 1;
         let t = cone.centre();
-        let found = deep(probe, (balls, last), t)?.filter(|found| found.depth > 2.0 * rounding);
+        let found = deep(probe, (balls, last), t, cone.radius)?.filter(|found| found.depth > 2.0 * rounding);
         let Some(found) = found else {
             // There may be a place after a shorter shift.
             cones.push(Cone { radius: 0.5 * cone.radius, ..cone });
@@ -128,11 +128,13 @@ pub(crate) fn cover<P: Probe>(
     ControlFlow::Continue(())
 }
 
-/// The deepest of some places after a shift by `t`, from those of other shifts.
+/// Looks for a place as deep as `wanted` after a shift by `t`, near those of other shifts, and returns it or
+/// the deepest one.
 fn deep<P: Probe>(
     probe: &mut P,
     (balls, last): (&[Ball], Option<(Vector, Vector)>),
     t: Vector,
+    wanted: f64,
 ) -> ControlFlow<(), Option<Deep>> {
     let mut best: Option<Deep> = None;
     let within = |ball: &&Ball| ball.radius - (t - ball.t).norm();
@@ -142,10 +144,16 @@ fn deep<P: Probe>(
     for place in near.chain(last).chain([probe.centres()[1] + t]) {
         let found = probe.deep(place, t)?;
         best = [best, found].into_iter().flatten().max_by(|a, b| a.depth.total_cmp(&b.depth));
+        if best.is_some_and(|best| best.depth >= wanted) {
+            break;
+        }
     }
     let Some(mut best) = best else { return ControlFlow::Continue(None) };
     let mut step = 0.25 * best.depth;
     for _ in 0..STEPS {
+        if best.depth >= wanted {
+            break;
+        }
         let Some(uphill) = best.uphill.try_normalize(1e-3) else { break };
         match probe.deep(best.place + uphill * step, t)? {
             Some(found) if found.depth > best.depth => best = found,
@@ -162,10 +170,11 @@ impl Cone {
         Self { corners, axis, cosine, covered, radius }
     }
 
-    /// How far the centre of such a ball on the axis may be ahead of the front that it covers; `None` if the front
-    /// is wider than the ball.
+    /// The distance by which the centre of such a ball on the axis may be ahead of the front that it covers.
+    /// `None` if the front is wider than the ball.
     fn room(&self) -> Option<f64> {
-        let room_sq = self.radius * self.radius - self.covered * self.covered * (1.0 - self.cosine * self.cosine);
+        let room_sq =
+            self.radius * self.radius - self.covered * self.covered * (1.0 - self.cosine * self.cosine);
         (room_sq > 0.0).then(|| room_sq.sqrt())
     }
 
@@ -228,3 +237,143 @@ impl PartialEq for Cone {
 }
 
 impl Eq for Cone {}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
+    use rand::RngExt;
+
+    use super::*;
+    use crate::penetration::survey::ContactSurvey;
+
+    /// A floor without thickness, and a box.
+    struct Floor {
+        centre: Vector,
+        axes: [Vector; 3],
+        half: [f64; 3],
+        asked: usize,
+    }
+
+    impl Floor {
+        /// The height of the box above and below its centre.
+        fn reach(&self) -> f64 {
+            (0..3).map(|k| self.half[k] * self.axes[k].z.abs()).sum()
+        }
+
+        fn meets(&self, t: Vector) -> bool {
+            (self.centre.z + t.z).abs() <= self.reach()
+        }
+    }
+
+    impl Probe for Floor {
+        fn is_apart(&mut self, t: Vector) -> ControlFlow<(), bool> {
+            ControlFlow::Continue(!self.meets(t))
+        }
+
+        fn touch(&mut self, _: Vector) -> ControlFlow<(), Option<(Vector, Vector)>> {
+            ControlFlow::Continue(None)
+        }
+
+        fn survey(&mut self, _: &mut ContactSurvey) -> ControlFlow<()> {
+            ControlFlow::Continue(())
+        }
+
+        fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
+            self.asked += 1;
+            let place = Vector::new(place.x, place.y, 0.0);
+            let from = place - self.centre - t;
+            let along = self.axes.map(|axis| axis.dot(&from));
+            let left = |k: &usize| self.half[*k] - along[*k].abs();
+            let nearest = (0..3).min_by(|i, k| left(i).total_cmp(&left(k))).unwrap();
+            let (depth, uphill) = (left(&nearest), -self.axes[nearest] * along[nearest].signum());
+            ControlFlow::Continue((depth > 0.0).then_some(Deep { place, depth, in_a: 0.0, uphill }))
+        }
+
+        fn centres(&self) -> [Vector; 2] {
+            [Vector::zeros(), self.centre]
+        }
+
+        fn axes(&self) -> [[Vector; 3]; 2] {
+            [[Vector::x(), Vector::y(), Vector::z()], self.axes]
+        }
+
+        fn slack(&self) -> f64 {
+            0.0
+        }
+
+        fn rounding(&self) -> f64 {
+            1e-12
+        }
+    }
+
+    #[test]
+    fn boxes_in_a_floor_have_lower_bounds_near_their_depths() {
+        let rng = &mut rng(4471);
+        // Sums of the bound of one place and of the cover, in depths, and the number: of boxes and of plates.
+        let mut sums = [[0.0; 3]; 2];
+        for round in 0..100 {
+            let pose = rotation(rng);
+            let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let axes = axes.map(|axis| Vector::from(pose.rotate(axis)));
+            let half = if round % 2 == 0 { [0.3, 0.2, 0.4] } else { [0.5, 0.1, 0.5] };
+            let mut floor = Floor { centre: Vector::zeros(), axes, half, asked: 0 };
+            floor.centre.z = floor.reach() * rng.random_range(-0.9..0.9);
+            let depth = floor.reach() - floor.centre.z.abs();
+            let ControlFlow::Continue(Some(deepest)) = floor.deep(floor.centre, Vector::zeros()) else {
+                continue;
+            };
+            let mut lower = deepest.depth;
+            let flow = cover(&mut floor, (&deepest, None), depth, (&mut Cover::default(), &mut lower));
+            assert!(flow.is_continue() && lower <= depth * (1.0 + 1e-9), "{lower} of {depth}");
+            assert!(floor.asked <= BALLS * (4 + STEPS) + 1, "{} questions", floor.asked);
+            for _ in 0..200 {
+                let t = Vector::from(unit_vector(rng)) * (lower * rng.random_range(0.0..1.0));
+                assert!(floor.meets(t), "round {round}: {t} of {lower}");
+            }
+            let own = [deepest.depth / depth, lower / depth, 1.0];
+            let of_kind = &mut sums[round % 2];
+            *of_kind = [0, 1, 2].map(|k| of_kind[k] + own[k]);
+        }
+        for ([alone, covered, count], wanted) in sums.into_iter().zip([0.65, 0.38]) {
+            assert!(count > 25.0 && covered > wanted * count && covered > 1.5 * alone, "{sums:?}");
+        }
+    }
+
+    /// The directions of the cones are all directions, and a ball covers what it is said to cover.
+    #[test]
+    fn cones_are_covered_up_to_their_reach() {
+        let rng = &mut rng(4472);
+        let mut reached = 0;
+        for round in 0..2000 {
+            let [mut cone, ..] = octahedron().map(|corners| Cone::new(corners, 0.5, 0.5));
+            for _ in 0..round % 4 {
+                cone = cone.divided()[rng.random_range(0..4)];
+            }
+            let t = Vector::from(unit_vector(rng)) * rng.random_range(0.0..1.0);
+            let ball = Ball { t, radius: rng.random_range(0.0..1.0), place: t, share: 0.0 };
+            let reach = cone.reach(&ball);
+            if reach <= 0.5 {
+                continue;
+            }
+            reached += 1;
+            for _ in 0..50 {
+                let weights = [0; 3].map(|_| rng.random_range(0.0..1.0));
+                let way: Vector = (0..3).map(|k| cone.corners[k] * weights[k]).sum();
+                let shift = way.normalize() * rng.random_range(0.5..reach);
+                assert!((shift - t).norm() <= ball.radius * (1.0 + 1e-9), "{shift} of {cone:?}, {ball:?}");
+            }
+        }
+        assert!(reached > 100, "{reached} cones are covered further");
+        for _ in 0..1000 {
+            let way = Vector::from(unit_vector(rng));
+            let holds = |corners: &[Vector; 3]| {
+                let [p, q, r] = corners;
+                let turns = [p.cross(q), q.cross(r), r.cross(p)].map(|side| side.dot(&way));
+                turns.iter().all(|x| *x >= 0.0) || turns.iter().all(|x| *x <= 0.0)
+            };
+            let parts = octahedron().map(|corners| Cone::new(corners, 0.5, 0.5).divided());
+            let near = parts.iter().flatten().filter(|cone| cone.axis.dot(&way) > 0.0);
+            assert!(near.filter(|cone| holds(&cone.corners)).count() >= 1, "{way} is in no cone");
+        }
+    }
+}

@@ -33,9 +33,7 @@ pub(crate) fn deep_in_solids(
 ) -> Option<Deep> {
     match are_solid {
         [false, false] => None,
-        [true, true] => {
-            deep([true; 2]).or_else(|| deep([true, false])).or_else(|| deep([false, true]))
-        }
+        [true, true] => deep([true; 2]).or_else(|| deep([true, false])).or_else(|| deep([false, true])),
         one => deep(one),
     }
 }

@@ -191,7 +191,7 @@ impl<'a> Elements<'a> {
         f32x16::load_array_ref(simd, &radii)
     }
 
-    /// Those of `lanes`, from the point `first` on, whose points are at an edge.
+    /// The lanes among `lanes`, from the point `first` on, whose points are at an edge, as bits.
     pub(crate) fn edges(&self, first: usize, lanes: u32) -> u32 {
         let is_edge = |lane: usize| self.placed.scan().kind(first + lane) == PointKind::Edge;
         Bits(lanes).fold(0, |edges, lane| edges | u32::from(is_edge(lane)) << lane)

@@ -247,7 +247,7 @@ fn convex_solids_have_the_depth_of_their_minkowski_difference() {
     let share = share / f64::from(overlapping);
     println!("{overlapping} overlap, {close} within 2 %, lower bound on average {share} of the depth");
     assert!(
-        overlapping > 60 && close * 10 >= overlapping * 9 && share > 0.6,
+        overlapping > 60 && close * 10 >= overlapping * 9 && share > 0.85,
         "{overlapping}, {close}, {share}"
     );
 }
