@@ -50,7 +50,7 @@ fn main() {
             };
             // The assignment of queries to threads varies, so scratches need several rounds to be
             // warm.
-            (0..10).for_each(|_| assert_eq!(ask(poses.len()), poses.len()));
+            (0..10).for_each(|_| assert_eq!(ask(poses.len()), poses.len(), "all are answered"));
             let [few, many] = [50, poses.len()].map(|n| calls(|| _ = ask(n)));
             if threads == 1 {
                 assert_eq!([few, many], [0, 0], "a batch on one thread");
