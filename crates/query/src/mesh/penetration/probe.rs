@@ -169,7 +169,9 @@ impl Probe for MeshProbe<'_> {
         if are_solid == [false; 2] {
             return ControlFlow::Continue(None);
         }
-        self.budget.go_on(self.spent.work())?;
+        let meshes = self.meshes();
+        let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
+        pair.meter.go_on()?;
         self.spent.evaluations += 1;
         ControlFlow::Continue(deep_in_solids(are_solid, |solid| self.deep_in(place, t, solid)))
     }
