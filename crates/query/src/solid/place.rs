@@ -45,13 +45,13 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
         if is_exact {
             let point = lowest - out * height;
             let is_met = height <= most
-                && (is_near(solid, &disc, &point, most) || near_gap(elements, solid, i).is_some());
+                && (is_near(solid, &disc, &point, most) || disc_gap(solid, &disc, most).is_some());
             return is_met.then_some(Place { point, normal: out, depth: solid.radius - height });
         }
     } else if solid.radius == 0.0 && solid.is_box() && !solid.is_point() && !is_edge {
         return None;
     }
-    let gap = near_gap(elements, solid, i)?;
+    let gap = disc_gap(solid, &disc, most)?;
     // The part of the shape over the disc may be far above it, while another part is at the rim.
     of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)).filter(|it| it.depth >= solid.radius - most)
 }
@@ -68,6 +68,11 @@ pub(crate) fn place_beside(elements: &Elements<'_>, solid: &Solid<'_>, i: usize,
 fn near_gap(elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> Option<Gap> {
     let (gap, thick) = elements.gap(solid, i, elements.margin);
     (gap.distance <= solid.radius + elements.margin.max(thick)).then_some(gap)
+}
+
+/// The nearest points of a core and a disc, if these are within `most`.
+fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<Gap> {
+    Some(solid.gap(disc, most)).filter(|gap| gap.distance <= most)
 }
 
 /// Returns `true` if a core and a disc are soon found to be within `most`, from a point of the disc.
@@ -129,6 +134,15 @@ fn deepest(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Option<Place> {
     let across = lowest - disc.centre + out * depth;
     if across.norm_squared() <= disc.radius * disc.radius {
         return at(disc.centre + across, depth + solid.radius);
+    }
+    if solid.is_point() {
+        let beside = across.norm();
+        let below_sq = solid.radius * solid.radius - (beside - disc.radius).powi(2);
+        return if below_sq < 0.0 {
+            None
+        } else {
+            at(disc.centre + across * (disc.radius / beside), depth + below_sq.sqrt())
+        };
     }
     if let Some(lowest) = solid.lowest_over(disc, &out) {
         let height = out.dot(&(lowest - disc.centre));
