@@ -318,6 +318,22 @@ fn cavities_and_open_meshes_are_not_solid() {
     assert!(through.upper > 0.06 - 1e-9 && through.upper < 0.0601 && through.lower > 0.05, "{through:?}");
 }
 
+/// A surface through a solid: the lower bound is more than the size of its triangles, in both orders.
+#[test]
+fn sheets_through_solids_have_lower_bounds() {
+    const SIDE: u32 = 40;
+    let vertices = (0..=SIDE).flat_map(|i| (0..=SIDE).map(move |j| [i, j]));
+    let vertices = vertices.map(|[i, j]| [0.1 * f64::from(i) - 2.0, 0.1 * f64::from(j) - 2.0, 0.2]).collect();
+    let corners = |i: u32, j: u32| [0, 1, SIDE + 2, SIDE + 1].map(|k| i * (SIDE + 1) + j + k);
+    let quads = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| corners(i, j)));
+    let sheet = TriangleMesh::new(vertices, quads.flat_map(|[p, q, r, s]| [[p, q, r], [p, r, s]]).collect());
+    let (sheet, block) = (sheet.unwrap(), cuboid([1.0; 3]));
+    for meshes in [[&sheet, &block], [&block, &sheet]] {
+        let found = ask(meshes, [Pose::IDENTITY; 2], &Budget::UNLIMITED);
+        assert!(found.upper > 0.8 - 1e-9 && found.upper < 0.801 && found.lower > 0.75, "{found:?}");
+    }
+}
+
 #[test]
 fn invalid_questions_have_no_known_penetration() {
     let mesh = cuboid([1.0; 3]);
