@@ -19,10 +19,11 @@ const BALLS: usize = 192;
 /// Cones at most.
 const CONES: usize = 1024;
 
-/// The share of the wanted bound that is enough.
-const ENOUGH: f64 = 0.9;
+/// The share of the greatest useful bound that is enough.
+pub(crate) const ENOUGH: f64 = 0.9;
 
-/// The place of a ball's centre along the way from the front of the cone to the furthest useful one.
+/// The place of a ball's centre on the axis of a cone, between the plane through the corners up to which the
+/// cone is covered and the furthest centre whose ball reaches these corners.
 const AHEAD: f64 = 0.6;
 
 /// Steps uphill from the deepest place.
@@ -55,7 +56,7 @@ struct Ball {
 struct Cone {
     /// Unit vectors.
     corners: [Vector; 3],
-    /// The unit vector in the middle, and the cosine of its angle with the corners, where it is greatest.
+    /// The unit vector in the middle, and the cosine of its greatest angle with a corner.
     axis: Vector,
     cosine: f64,
     /// Shorter shifts leave a contact.
@@ -71,15 +72,20 @@ impl Ball {
     }
 }
 
-/// Raises `lower` towards `enough`, from the deepest place without a shift. `last` is a shift that is almost
-/// long enough to separate the things, and where they still touch. Breaks if the budget is spent.
+/// A shift that separates the things, and one that is almost as long with the place where they still touch.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WayOut {
+    pub(crate) apart: Vector,
+    pub(crate) last: Option<(Vector, Vector)>,
+}
+
+/// Raises `lower` up to `enough`, from the deepest place without a shift. Breaks if the budget is spent.
 pub(crate) fn cover<P: Probe>(
     probe: &mut P,
-    (deepest, last): (&Deep, Option<(Vector, Vector)>),
+    (deepest, out): (&Deep, &WayOut),
     enough: f64,
     (Cover { balls, cones }, lower): (&mut Cover, &mut f64),
 ) -> ControlFlow<()> {
-    let enough = ENOUGH * enough;
     let rounding = probe.rounding();
     let first = Ball::new(Vector::zeros(), deepest, rounding);
     // Also if one of them is not a number.
@@ -87,9 +93,11 @@ pub(crate) fn cover<P: Probe>(
         return ControlFlow::Continue(());
     }
     balls.clear();
+    balls.reserve(BALLS + 1);
     balls.push(first);
     cones.clear();
-    cones.extend(octahedron().map(|corners| Cone::new(corners, *lower, first.radius)));
+    cones.reserve(CONES);
+    cones.extend(octahedron().map(|corners| Cone::new(corners, *lower, first.radius.max(*lower))));
     let mut tried = 0;
     while let Some(cone) = cones.pop() {
         *lower = lower.max(cone.covered.min(enough));
@@ -110,7 +118,11 @@ pub(crate) fn cover<P: Probe>(
         }
         tried += 1;
         let t = cone.centre();
-        let found = deep(probe, (balls, last), t, cone.radius)?.filter(|found| found.depth > 2.0 * rounding);
+        let found = deep(probe, (balls, out.last), t, cone.radius)?;
+        // A place that contradicts the shift that separates the things is outside one of them.
+        let most = (out.apart - t).norm();
+        let is_sound = |found: &Deep| found.depth > 2.0 * rounding && found.depth <= most + probe.slack();
+        let found = found.filter(is_sound).map(|found| Deep { depth: found.depth.min(most), ..found });
         let Some(found) = found else {
             // There may be a place after a shorter shift.
             cones.push(Cone { radius: 0.5 * cone.radius, ..cone });
@@ -118,7 +130,8 @@ pub(crate) fn cover<P: Probe>(
         };
         let ball = Ball::new(t, &found, rounding);
         balls.push(ball);
-        let own = Cone { radius: ball.radius, ..cone };
+        // A single small ball does not divide it at once.
+        let own = Cone { radius: ball.radius.max(0.5 * cone.radius), ..cone };
         if own.reach(&ball) > cone.covered * (1.0 + GAIN) {
             cones.push(own);
         } else {
@@ -142,7 +155,7 @@ fn deep<P: Probe>(
     let near = ball.into_iter().flat_map(|ball| [ball.share, 1.0].map(|s| ball.place + (t - ball.t) * s));
     let last = last.map(|(shift, place)| place + (t - shift) * 0.5);
     for place in near.chain(last).chain([probe.centres()[1] + t]) {
-        let found = probe.deep(place, t)?;
+        let found = probe.deep(place, t)?.filter(|found| found.depth > 0.0);
         best = [best, found].into_iter().flatten().max_by(|a, b| a.depth.total_cmp(&b.depth));
         if best.is_some_and(|best| best.depth >= wanted) {
             break;
@@ -170,8 +183,8 @@ impl Cone {
         Self { corners, axis, cosine, covered, radius }
     }
 
-    /// The distance by which the centre of such a ball on the axis may be ahead of the front that it covers.
-    /// `None` if the front is wider than the ball.
+    /// The greatest distance of a ball's centre on the axis from the plane through the corners up to which the
+    /// cone is covered, if the ball is to reach them. `None` if they are too far from the axis.
     fn room(&self) -> Option<f64> {
         let room_sq =
             self.radius * self.radius - self.covered * self.covered * (1.0 - self.cosine * self.cosine);
@@ -192,7 +205,8 @@ impl Cone {
             let along = corner.dot(&ball.t);
             let half_sq = ball.radius * ball.radius - (ball.t.norm_squared() - along * along);
             let half = half_sq.max(0.0).sqrt();
-            if along < 0.0 || half_sq <= 0.0 || along - half > self.covered {
+            let is_met = along >= 0.0 && half_sq > 0.0 && half_sq.is_finite();
+            if !is_met || along - half > self.covered {
                 return 0.0;
             }
             reach = reach.min(along + half);
@@ -323,7 +337,10 @@ mod tests {
                 continue;
             };
             let mut lower = deepest.depth;
-            let flow = cover(&mut floor, (&deepest, None), depth, (&mut Cover::default(), &mut lower));
+            let apart = Vector::z() * (depth.copysign(floor.centre.z) * (1.0 + 1e-9));
+            let out = WayOut { apart, last: None };
+            let flow =
+                cover(&mut floor, (&deepest, &out), ENOUGH * depth, (&mut Cover::default(), &mut lower));
             assert!(flow.is_continue() && lower <= depth * (1.0 + 1e-9), "{lower} of {depth}");
             assert!(floor.asked <= BALLS * (4 + STEPS) + 1, "{} questions", floor.asked);
             for _ in 0..200 {
@@ -345,8 +362,8 @@ mod tests {
         let rng = &mut rng(4472);
         let mut reached = 0;
         for round in 0..2000 {
-            let [mut cone, ..] = octahedron().map(|corners| Cone::new(corners, 0.5, 0.5));
-            for _ in 0..round % 4 {
+            let mut cone = Cone::new(octahedron()[round % 8], 0.5, 0.5);
+            for _ in 0..rng.random_range(0..4) {
                 cone = cone.divided()[rng.random_range(0..4)];
             }
             let t = Vector::from(unit_vector(rng)) * rng.random_range(0.0..1.0);

@@ -41,5 +41,6 @@ pub(crate) fn climb<P: Probe>(
             step *= 0.5;
         }
     }
+    *lower = lower.max(best.depth - rounding);
     ControlFlow::Continue(best)
 }

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::penetration::cover::{Cover, cover};
+use crate::penetration::cover::{Cover, ENOUGH, WayOut, cover};
 use crate::penetration::deepest::climb;
 use crate::penetration::probe::{Deep, Probe, Vector};
 use crate::penetration::survey::{ContactSurvey, KEPT};
@@ -126,10 +126,14 @@ impl<P: Probe> Search<'_, P> {
         self.settle()?;
         self.lengthen()?;
         self.raise()?;
-        let Some(deepest) = self.deepest else { return ControlFlow::Continue(()) };
+        let enough = ENOUGH * self.enough();
+        let Some(deepest) = self.deepest.filter(|_| self.lower < enough) else {
+            return ControlFlow::Continue(());
+        };
         let shift = self.best.way * self.best.meets;
         let last = self.probe.touch(shift)?.map(|(place, _)| (shift, place));
-        cover(self.probe, (&deepest, last), self.enough(), (self.cover, &mut self.lower))
+        let out = WayOut { apart: self.best.vector(), last };
+        cover(self.probe, (&deepest, &out), enough, (self.cover, &mut self.lower))
     }
 
     /// Lengthens the shift a little if a longer one, by rounding, does not separate the things.

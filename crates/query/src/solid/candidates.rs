@@ -32,7 +32,7 @@ pub(crate) struct CandidateBlock {
     missed: u32,
     /// The lanes whose normal is opposite to the direction in which the shape moves out.
     turned: u32,
-    /// The lanes whose disc the shape is behind of.
+    /// The lanes behind whose disc the shape is.
     behind: u32,
     /// The lanes whose place is known.
     placed: u32,
@@ -167,7 +167,7 @@ impl CandidateBlocks {
         })
     }
 
-    /// The candidates that may be deeper than `depth` before the surface, or behind it, each with a key
+    /// The candidates that may be as deep as `depth` before the surface, or behind it, each with a key
     /// that orders them by the bound.
     pub(crate) fn deeper(&self, is_front: bool, depth: f32) -> impl Iterator<Item = (u64, Candidate)> {
         let all = self.lanes(move |block| block.on_side(is_front));

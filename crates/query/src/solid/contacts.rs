@@ -196,8 +196,10 @@ impl Selection<'_, '_> {
             let Met { contact, band, .. } = &places[best];
             (contact.depth + LEVEL * band) / self.elements.scale()
         };
+        // No less is enough later, whatever the local radius of a deeper place.
+        let depth = |best: usize| self.places[best].contact.depth / self.elements.scale();
         #[expect(clippy::cast_possible_truncation, reason = "compared once more below")]
-        let least = best.map_or(f32::NEG_INFINITY, |best| (enough(self.places, best) as f32).next_down());
+        let least = best.map_or(f32::NEG_INFINITY, |best| (depth(best) as f32).next_down());
         self.order.clear();
         self.order.extend(self.found.deeper(is_front, least));
         while let Some((_, candidate)) = self.order.pop() {
@@ -224,7 +226,8 @@ impl Selection<'_, '_> {
         let at = single(at.into());
         let mut tried = [u32::MAX; TRIES];
         for attempt in 0..TRIES {
-            let own = self.found.of_point(point).filter(|_| attempt == 0).map(|candidate| (0.0, candidate));
+            let own = if attempt == 0 { self.found.of_point(point) } else { None };
+            let own = own.map(|candidate| (0.0, candidate));
             let nearest = own.or_else(|| self.found.nearest(self.level, at, &tried[..attempt]));
             let Some((away_sq, candidate)) = nearest else { return };
             tried[attempt] = id32(self.found.point(candidate));
