@@ -183,8 +183,8 @@ impl Cone {
         Self { corners, axis, cosine, covered, radius }
     }
 
-    /// The greatest distance of a ball's centre on the axis from the plane through the corners up to which the
-    /// cone is covered, if the ball is to reach them. `None` if they are too far from the axis.
+    /// The greatest distance of a ball's centre on the axis from the plane through the corners up to which
+    /// the cone is covered, if the ball is to reach them. `None` if they are too far from the axis.
     fn room(&self) -> Option<f64> {
         let room_sq =
             self.radius * self.radius - self.covered * self.covered * (1.0 - self.cosine * self.cosine);
