@@ -16,7 +16,7 @@ use nearmiss::{
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::grid::Grid;
-use nearmiss_benches::rivals::solids::TriMeshTarget;
+use nearmiss_benches::rivals::solids::{Manifolds, TriMeshTarget};
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
@@ -65,13 +65,23 @@ impl Rivals {
         Ok(Self { grid: Grid::new(&points, single([radius; 3])[0]), tree, mesh })
     }
 
-    /// Nanoseconds of parry, the grid and kiddo for these shapes; `-` if a rival has no such question.
-    fn told(&self, shapes: &[Shape<'_>], passes: u32) -> [String; 3] {
+    /// Nanoseconds of parry's touch, distance and contacts, of the grid and of kiddo for these shapes; `-`
+    /// if a rival has no such question.
+    fn told(&self, shapes: &[Shape<'_>], passes: u32) -> [String; 5] {
         let told = |(time, _): (f64, usize)| format!("{:.0}", time / count(shapes.len()));
         let none = || "-".to_string();
-        let mesh = self.mesh.as_ref().map_or_else(none, |mesh| {
-            told(least(passes, || shapes.iter().filter(|&s| mesh.touches(black_box(s))).count()))
-        });
+        let [touch, distance, contacts] = self.mesh.as_ref().map_or_else(
+            || [none(), none(), none()],
+            |mesh| {
+                let all = || shapes.iter();
+                let mut working = Manifolds::default();
+                [
+                    told(least(passes, || all().filter(|&s| mesh.touches(black_box(s))).count())),
+                    told(least(passes, || all().filter(|&s| mesh.distance(black_box(s)) > 0.0).count())),
+                    told(least(passes, || all().map(|s| mesh.contacts(black_box(s), &mut working)).sum())),
+                ]
+            },
+        );
         let balls: Vec<([f32; 3], f32)> = shapes
             .iter()
             .filter_map(|shape| match *shape {
@@ -80,7 +90,7 @@ impl Rivals {
             })
             .collect();
         if balls.is_empty() {
-            return [mesh, none(), none()];
+            return [touch, distance, contacts, none(), none()];
         }
         let by_grid =
             least(passes, || balls.iter().filter(|&&(c, r)| self.grid.any_within(black_box(c), r)).count());
@@ -91,7 +101,7 @@ impl Rivals {
             };
             balls.iter().filter(within).count()
         });
-        [mesh, told(by_grid), told(by_tree)]
+        [touch, distance, contacts, told(by_grid), told(by_tree)]
     }
 }
 
@@ -117,9 +127,9 @@ fn measure(object: &Object, arguments: &Arguments) -> Result<(), Failure> {
         arguments.radius
     );
     println!(
-        "| ns a query, least of {passes} passes | touch | certified | distance | contacts | parry | grid | kiddo | touching |"
+        "| ns a query, least of {passes} passes | touch | certified | distance | contacts | parry: touch | distance | contacts | grid | kiddo | touching |"
     );
-    println!("| --- |{}", " --: |".repeat(8));
+    println!("| --- |{}", " --: |".repeat(10));
     let targets = [&estimated, &certified];
     for (name, away) in [("in the bounding box", None), ("up to 3 r off", Some(3.0))] {
         let drawn = draw(object, (number, radius, seed), away);
@@ -128,9 +138,9 @@ fn measure(object: &Object, arguments: &Arguments) -> Result<(), Failure> {
         {
             let ours = of_shapes(targets, shapes, passes);
             let [touch, proven, distance, manifold, hits] = ours.map(|x| x / count(number));
-            let [mesh, grid, tree] = rivals.told(shapes, passes);
+            let [mesh, apart, met, grid, tree] = rivals.told(shapes, passes);
             println!(
-                "| {kind}, {name} | {touch:.0} | {proven:.0} | {distance:.0} | {manifold:.0} | {mesh} | {grid} | {tree} | {hits:.3} |",
+                "| {kind}, {name} | {touch:.0} | {proven:.0} | {distance:.0} | {manifold:.0} | {mesh} | {apart} | {met} | {grid} | {tree} | {hits:.3} |",
             );
         }
         let mut scratch = Scratch::default();
@@ -152,7 +162,7 @@ fn measure(object: &Object, arguments: &Arguments) -> Result<(), Failure> {
                     format!("{:.0}", time / count(rays.len()))
                 },
             );
-            println!("| {kind}, {name} | {ours:.0} | {proven:.0} | | | {mesh} | | | {} |", rays.len());
+            println!("| {kind}, {name} | {ours:.0} | {proven:.0} | | | {mesh} | | | | | {} |", rays.len());
         }
     }
     let spheres = draw(object, (number, radius, seed), Some(3.0)).spheres;
