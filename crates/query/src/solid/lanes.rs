@@ -17,6 +17,9 @@ const ROUNDING: f64 = 8e-6;
 /// Coordinates beyond this have squares near the end of single precision.
 const FARTHEST: f64 = 1e15;
 
+/// What the square of a sine may be too small by, as normals in steps are not of unit length.
+const SINE_SQ: f32 = 5e-4;
+
 /// The box about the core of a shape, in single precision.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LaneBox {
@@ -110,7 +113,7 @@ impl LaneBox {
     ) -> Distances<S> {
         let zero = f32x16::splat(simd, 0.0);
         if !self.is_near {
-            return Distances { from_point: zero, from_plane: zero, beside: zero };
+            return Distances { from_point: zero, from_plane: zero, beside: zero, sine: zero };
         }
         let [cx, cy, cz] = self.centre;
         let d = [points[0] - cx, points[1] - cy, points[2] - cz];
@@ -118,16 +121,21 @@ impl LaneBox {
         if self.is_point {
             let square = squared(d);
             let beside = (square - height * height).max(0.0).sqrt();
-            return Distances { from_point: square.sqrt(), from_plane: height, beside };
+            let sine = f32x16::splat(simd, 1.0);
+            return Distances { from_point: square.sqrt(), from_plane: height, beside, sine };
         }
-        let (mut sum, mut reach) = (zero, zero);
+        let (mut sum, mut reach, mut rise) = (zero, zero, zero);
         for j in 0..3 {
             let axis = self.axes[j];
-            let beyond = (along(d, axis).abs() - self.half[j]).max(0.0);
+            let (at, slope) = (along(d, axis), along(*normals, axis));
+            let beyond = (at.abs() - self.half[j]).max(0.0);
             sum += beyond * beyond;
-            reach += along(*normals, axis).abs() * self.half[j];
+            reach += slope.abs() * self.half[j];
+            rise += beyond.copysign(at) * slope;
         }
-        Distances { from_point: sum.sqrt(), from_plane: (height - reach).max(0.0), beside: zero }
+        let sine_sq = (sum - rise * rise).max(0.0) / sum.max(f32::MIN_POSITIVE) + SINE_SQ;
+        let from_plane = (height - reach).max(0.0);
+        Distances { from_point: sum.sqrt(), from_plane, beside: zero, sine: sine_sq.sqrt().min(1.0) }
     }
 }
 
@@ -138,6 +146,9 @@ pub(crate) struct Distances<S: Simd> {
     pub(crate) from_plane: f32x16<S>,
     /// The distance from the axis of each plane's normal; zero unless the core is a point.
     beside: f32x16<S>,
+    /// The sine of the angle between each normal and the way from the core to the point; 1 if the core is a
+    /// point.
+    sine: f32x16<S>,
 }
 
 impl<S: Simd> Distances<S> {
@@ -154,6 +165,8 @@ impl<S: Simd> Distances<S> {
         let of_balls = self.from_point - radii;
         let (up, out) = ((self.from_plane - thick).max(zero), (self.beside - radii).max(zero));
         let of_discs = of_balls.max((up * up + out * out).sqrt());
+        // The core is beyond the plane across the way to the point, and a disc reaches this far towards it.
+        let of_discs = of_discs.max(self.from_point - radii * self.sine - thick);
         are_discs.select(of_discs, of_balls)
     }
 }
