@@ -32,7 +32,7 @@ pub use point::kind::{PointKind, SLAB, THICKNESS};
 pub use point::leaf_block::{LeafBlock, Leaves};
 pub use point::stored_point::StoredPoint;
 pub use scan::apart::{Extent, apart};
-pub use scan::arrays::ScanArrays;
+pub use scan::arrays::{ObstacleParts, ScanArrays};
 pub use scan::build::PointHierarchy;
 pub use scan::clearance::{Clearance, ClearanceGrid};
 pub use scan::data::HierarchyMeta;

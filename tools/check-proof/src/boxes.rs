@@ -1,4 +1,4 @@
-//! Proofs that two placed boxes are disjoint.
+//! Proofs that two placed boxes, or parts of points, are disjoint.
 //!
 //! A separating direction is searched in floating point; any direction is valid. That it separates
 //! the boxes is then shown in intervals. A box is exactly the set of `centre + Σ t_k axes_k` with
@@ -17,6 +17,50 @@ pub(crate) struct Placed {
     half: Vector,
     about: Vector,
     directions: [Vector; 3],
+    /// The part of the obstacle about each place of the box, if it has a size.
+    part: Option<Part>,
+}
+
+/// A ball about the origin and, for points on sheets, the slab that cuts it: the places y with
+/// |normal · y| ≤ slab.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    radius: f64,
+    cut: Option<([Interval; 3], f64)>,
+}
+
+impl Part {
+    /// Returns about how far the part extends along `d`, and the share of the normal in `d` that proves it.
+    ///
+    /// For each share t, d · y = t (normal · y) + (d − t normal) · y ≤ |t| slab + |d − t normal| radius.
+    fn extent(&self, d: Vector) -> (f64, f64) {
+        let whole = (self.radius * times(d, d).sqrt(), 0.0);
+        let Some((normal, slab)) = self.cut else { return whole };
+        let normal = normal.map(middle);
+        let (of_d, of_normal) = (times(d, d).sqrt(), times(normal, normal).sqrt());
+        let cosine = times(d, normal) / (of_d * of_normal);
+        let (height, sine) = (slab / of_normal, (1.0 - cosine * cosine).max(0.0).sqrt());
+        let face = (self.radius * self.radius - height * height).max(0.0).sqrt();
+        let share = (cosine.abs() - sine * height / face).max(0.0).copysign(cosine) * of_d / of_normal;
+        let rest = [0, 1, 2].map(|k| d[k] - share * normal[k]);
+        let cut = share.abs() * slab + times(rest, rest).sqrt() * self.radius;
+        if cut < whole.0 { (cut, share) } else { whole }
+    }
+
+    /// Returns a bound of how far the part extends along `d`.
+    fn greatest_extent(&self, d: [Interval; 3]) -> Interval {
+        let (_, share) = self.extent(d.map(middle));
+        let radius = Interval::new(self.radius);
+        let Some((normal, slab)) = self.cut.filter(|_| share != 0.0) else {
+            return radius * dot(d, d).root();
+        };
+        let rest = [0, 1, 2].map(|k| d[k] - Interval::new(share) * normal[k]);
+        Interval::new(share.abs()) * Interval::new(slab) + radius * dot(rest, rest).root()
+    }
+}
+
+fn middle(x: Interval) -> f64 {
+    0.5 * x.low + 0.5 * x.high
 }
 
 impl Placed {
@@ -29,28 +73,38 @@ impl Placed {
         let linear = turned(enclosure.centre);
         let centre = [0, 1, 2].map(|i| linear[i] + shift[i]);
         let axes = enclosure.axes.map(turned);
-        let middle = |v: [Interval; 3]| v.map(|x| 0.5 * x.low + 0.5 * x.high);
-        let (about, directions) = (middle(centre), axes.map(middle));
-        Self { centre, axes, half: enclosure.half.map(f64::from), about, directions }
+        let (about, directions) = (centre.map(middle), axes.map(|axis| axis.map(middle)));
+        Self { centre, axes, half: enclosure.half.map(f64::from), about, directions, part: None }
     }
 
-    /// Returns a stored position transformed by `matrix`.
-    pub(crate) fn point(position: [f32; 3], matrix: &Matrix) -> Self {
-        Self::new(
-            &Enclosure { first: 0, count: 1, centre: position, half: [0.0; 3], axes: [[0.0; 3]; 3] },
-            matrix,
-        )
+    /// Returns the part of the obstacle about a stored position, transformed by `matrix`, which scales by
+    /// `scale`. The part is a ball and, given a unit normal, half the thickness of a slab that cuts it.
+    pub(crate) fn part(
+        position: [f32; 3],
+        (radius, cut): (f64, Option<([f32; 3], f64)>),
+        (matrix, scale): (&Matrix, f64),
+    ) -> Self {
+        let at = |axes| Enclosure { first: 0, count: 1, centre: position, half: [0.0; 3], axes };
+        // A turned normal and a turned place are each longer by the scale.
+        let cut = cut.map(|(normal, slab)| {
+            let turned = Self::new(&at([normal, [0.0; 3], [0.0; 3]]), matrix).axes[0];
+            (turned, slab * scale * scale)
+        });
+        let part = Some(Part { radius: radius * scale, cut });
+        Self { part, ..Self::new(&at([[0.0; 3]; 3]), matrix) }
     }
 
-    /// Returns approximately how far the box extends from its centre along `d`.
+    /// Returns approximately how far the box and the part extend from the centre along `d`.
     fn extent(&self, d: Vector) -> f64 {
-        (0..3).map(|k| self.half[k] * times(d, self.directions[k]).abs()).sum()
+        let of_box: f64 = (0..3).map(|k| self.half[k] * times(d, self.directions[k]).abs()).sum();
+        of_box + self.part.map_or(0.0, |part| part.extent(d).0)
     }
 
-    /// Returns a bound of how far the box extends from its centre along `d`.
+    /// Returns a bound of how far the box and the part extend from the centre along `d`.
     fn greatest_extent(&self, d: [Interval; 3]) -> Interval {
         let along = |k: usize| Interval::new(self.half[k]) * dot(d, self.axes[k]).magnitude();
-        along(0) + along(1) + along(2)
+        let of_box = along(0) + along(1) + along(2);
+        self.part.map_or(of_box, |part| of_box + part.greatest_extent(d))
     }
 }
 
@@ -68,17 +122,12 @@ pub(crate) fn distance(a: &Placed, b: &Placed, wanted: f64) -> Option<f64> {
     proven.or_else(|| distance_along(a, b, between_nearest(a, b), wanted))
 }
 
-/// Returns the approximate distance of two sets of balls, if they are proven to be at least
-/// `wanted` apart. A ball is given by its centre, or by a box of which every place is a centre, and
-/// by its radius.
-pub(crate) fn distance_of_balls(a: &[(Placed, f64)], b: &[(Placed, f64)], wanted: f64) -> Option<f64> {
+/// Returns the approximate distance of two sets of parts and boxes, if they are proven to be at least `wanted`
+/// apart.
+pub(crate) fn distance_of_all(a: &[Placed], b: &[Placed], wanted: f64) -> Option<f64> {
     let mut least = f64::INFINITY;
-    for (p, of_a) in a {
-        for (q, of_b) in b {
-            let radii = Interval::new(*of_a) + Interval::new(*of_b);
-            let apart = distance(p, q, (Interval::new(wanted) + radii).high)?;
-            least = least.min(apart - radii.high);
-        }
+    for (p, q) in a.iter().flat_map(|p| b.iter().map(move |q| (p, q))) {
+        least = least.min(distance(p, q, wanted)?);
     }
     Some(least)
 }

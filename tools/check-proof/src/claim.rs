@@ -1,6 +1,6 @@
 //! Checks of the claims of a line of a proof.
 
-use crate::boxes::{Placed, distance, distance_of_balls};
+use crate::boxes::{Placed, distance, distance_of_all};
 use crate::cover::{Rectangle, uncovered};
 use crate::placement::Placement;
 use crate::proof::{Enclosure, Line, Matrix, Poses, Semantics, Verdict};
@@ -172,8 +172,8 @@ impl Checker<'_> {
     }
 
     /// Returns the approximate distance of the obstacles of a node pair, if their points prove that
-    /// it is at least `wanted`. The proof uses the balls about the points of either node, or of
-    /// both, that contain the obstacle.
+    /// it is at least `wanted`. The proof uses the parts of the obstacle about the points of either
+    /// node, or of both.
     fn by_points(
         &self,
         line: &Line,
@@ -185,20 +185,21 @@ impl Checker<'_> {
         if line.semantics != Semantics::Obstacle {
             return None;
         }
-        let balls = |side: usize, node: &Enclosure, matrix: &Matrix| -> Option<Vec<(Placed, f64)>> {
+        let parts = |side: usize, node: &Enclosure, matrix: &Matrix| -> Option<Vec<Placed>> {
             let subject = self.subjects[side];
             let scale = placements[side].scale * (1.0 + 1e-12);
             let range = node.first as usize..(node.first + node.count) as usize;
-            let ball =
-                |k: usize| (Placed::point(subject.scan.positions()[k], matrix), subject.reach(k) * scale);
-            (node.count <= POINT_BY_POINT).then(|| range.map(ball).collect())
+            let part = |k: usize| {
+                let size = (subject.reach(k), subject.slab(k));
+                Placed::part(subject.scan.positions()[k], size, (matrix, scale))
+            };
+            (node.count <= POINT_BY_POINT).then(|| range.map(part).collect())
         };
         let (of_a, of_b) =
-            (balls(0, &line.nodes_a[i], &line.placed_a), balls(1, &line.nodes_b[j], &line.placed_b));
-        let (box_a, box_b) = ([(*a, 0.0)], [(*b, 0.0)]);
-        let one = of_a.as_ref().and_then(|of_a| distance_of_balls(of_a, &box_b, wanted));
-        let other = || of_b.as_ref().and_then(|of_b| distance_of_balls(&box_a, of_b, wanted));
-        let both = || distance_of_balls(of_a.as_ref()?, of_b.as_ref()?, wanted);
+            (parts(0, &line.nodes_a[i], &line.placed_a), parts(1, &line.nodes_b[j], &line.placed_b));
+        let one = of_a.as_ref().and_then(|of_a| distance_of_all(of_a, &[*b], wanted));
+        let other = || of_b.as_ref().and_then(|of_b| distance_of_all(&[*a], of_b, wanted));
+        let both = || distance_of_all(of_a.as_ref()?, of_b.as_ref()?, wanted);
         one.or_else(other).or_else(both)
     }
 

@@ -1,8 +1,8 @@
 //! Checks the proofs of `nearmiss collide --prove` with none of the code that found them.
 //!
 //! * Separated: the node pairs cover all pairs of points, and their enclosures are disjoint, in
-//!   interval arithmetic. For obstacles, the balls about their points that contain the obstacle may
-//!   be disjoint instead.
+//!   interval arithmetic. For obstacles, the parts about their points that contain the obstacle may
+//!   be disjoint instead: balls, cut by slabs on sheets.
 //! * Intersecting: the witness is a zero of both functions, summed over all points in double
 //!   precision. For obstacles, it is a zero in a cell, a place in a ball, or a measured point.
 //! * Each scan: a million points of its surface are in the enclosures of the nodes of their nearest

@@ -85,6 +85,12 @@ impl Subject {
         }
     }
 
+    /// Returns the normal of point `i`, if it samples a sheet, and half the thickness of the slab about its
+    /// tangent plane that contains its part of the obstacle.
+    pub(crate) fn slab(&self, i: usize) -> Option<([f32; 3], f64)> {
+        self.is_on_sheet(i).then(|| (self.scan.arrays().normals[i], rounded(SLAB * self.radius(i))))
+    }
+
     /// Returns `true` if `x`, a place of the surface in the stored frame, belongs to the obstacle,
     /// up to rounding: it is in the cell of its nearest point, which samples a sheet.
     pub(crate) fn is_in_cell(&self, x: [f64; 3]) -> bool {

@@ -4,6 +4,8 @@
 //! with the six face normals only. The nine edge axes separate few further pairs of thin patches
 //! and cost more than they save (benches/record).
 
+use std::ops::{Add, Mul};
+
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
@@ -182,27 +184,37 @@ impl Relative {
     #[must_use]
     pub fn points_back<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
         let [tx, ty, tz] = self.translation;
-        let (x, y, z) = (points[0] - tx, points[1] - ty, points[2] - tz);
-        let [rx, ry, rz] = self.rotation;
+        let [x, y, z] = self.directions_back(&[points[0] - tx, points[1] - ty, points[2] - tz]);
         let back = self.scale_back();
-        [
-            (x * rx[0] + y * ry[0] + z * rz[0]) * back,
-            (x * rx[1] + y * ry[1] + z * rz[1]) * back,
-            (x * rx[2] + y * ry[2] + z * rz[2]) * back,
-        ]
+        [x * back, y * back, z * back]
     }
 
     /// Transforms sixteen points of b's frame to a's.
     #[inline(always)]
     #[must_use]
     pub fn points<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
-        let [x, y, z] = *points;
-        let ([rx, ry, rz], [tx, ty, tz]) = (self.linear, self.translation);
+        let [x, y, z] = turned(&self.linear, *points);
+        let [tx, ty, tz] = self.translation;
+        [x + tx, y + ty, z + tz]
+    }
+
+    /// Transforms sixteen directions of a's frame to b's.
+    #[inline(always)]
+    #[must_use]
+    pub fn directions_back<S: Simd>(&self, [x, y, z]: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+        let [rx, ry, rz] = self.rotation;
         [
-            x * rx[0] + y * rx[1] + z * rx[2] + tx,
-            x * ry[0] + y * ry[1] + z * ry[2] + ty,
-            x * rz[0] + y * rz[1] + z * rz[2] + tz,
+            *x * rx[0] + *y * ry[0] + *z * rz[0],
+            *x * rx[1] + *y * ry[1] + *z * rz[1],
+            *x * rx[2] + *y * ry[2] + *z * rz[2],
         ]
+    }
+
+    /// Transforms sixteen directions of b's frame to a's.
+    #[inline(always)]
+    #[must_use]
+    pub fn directions<S: Simd>(&self, v: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+        turned(&self.rotation, *v)
     }
 
     /// Transforms a point of a's frame to b's.
@@ -307,7 +319,7 @@ impl Relative {
 }
 
 #[inline(always)]
-fn turned<S: Simd>(rows: &Axes, [x, y, z]: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+fn turned<V: Copy + Add<Output = V> + Mul<f32, Output = V>>(rows: &Axes, [x, y, z]: [V; 3]) -> [V; 3] {
     let [rx, ry, rz] = rows;
     [x * rx[0] + y * rx[1] + z * rx[2], x * ry[0] + y * ry[1] + z * ry[2], x * rz[0] + y * rz[1] + z * rz[2]]
 }

@@ -5,13 +5,14 @@ use std::ops::Range;
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::spread_out;
 use nearmiss_surface::SurfacePlan;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
 use crate::patch::covering::Covering;
 use crate::point::disc::{DENSE_SHARES, DiscRadii, PointCode};
-use crate::point::kind::{ball, cell_radius, is_on_sheet, obstacle_ball, sheet_reach};
+use crate::point::kind::{SLAB, ball, cell_radius, is_on_sheet, obstacle_ball, sheet_reach};
 use crate::point::leaf_block::Leaves;
 use crate::scan::outline::Outline;
 use crate::tree::wide::Tree;
@@ -55,6 +56,18 @@ pub struct ScanArrays<'a> {
     /// The points after them, sparse or left over, are balls in the obstacle. A leaf has points of
     /// one sort only.
     pub dense: usize,
+}
+
+/// What contains the obstacle near each point of a block: a ball about the point and, on a sheet, a slab about
+/// its tangent plane.
+#[derive(Debug, Clone, Copy)]
+pub struct ObstacleParts {
+    /// The normals of the points; zero in unused lanes.
+    pub normals: [[f32; PointBlock::WIDTH]; 3],
+    /// The radii of the balls, at least [`ScanArrays::obstacle_reach`]; zero in unused lanes.
+    pub reaches: [f32; PointBlock::WIDTH],
+    /// Half the thicknesses of the slabs. Infinite where there is only a ball, and in unused lanes.
+    pub slabs: [f32; PointBlock::WIDTH],
 }
 
 impl ScanArrays<'_> {
@@ -149,14 +162,9 @@ impl ScanArrays<'_> {
         balls
     }
 
-    /// Returns an upper bound of [`Self::obstacle_reach`] for the points in a block; 0 in unused
-    /// lanes.
-    ///
-    /// # Panics
-    /// If there is no such block.
+    /// Returns an upper bound of [`Self::obstacle_reach`] for the points in a block; zero in unused lanes.
     #[inline(always)]
-    #[must_use]
-    pub fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
+    fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
         let mut reaches = self.obstacle_balls(block);
         if let Some((codes, radii)) = self.dense_block(block) {
             for lane in 0..PointBlock::WIDTH {
@@ -170,6 +178,37 @@ impl ScanArrays<'_> {
             }
         }
         reaches
+    }
+
+    /// Returns what contains the obstacle near each of the points in a block.
+    ///
+    /// # Panics
+    /// If there is no such block.
+    #[inline(always)]
+    #[must_use]
+    pub fn obstacle_parts(&self, block: usize) -> ObstacleParts {
+        let mut normals = [[0.0; PointBlock::WIDTH]; 3];
+        spread_out(&self.normals[self.points_of(block)], &mut normals);
+        ObstacleParts { normals, reaches: self.obstacle_reaches(block), slabs: self.obstacle_slabs(block) }
+    }
+
+    /// Returns half the thicknesses of the slabs of the points in a block.
+    #[inline(always)]
+    fn obstacle_slabs(&self, block: usize) -> [f32; PointBlock::WIDTH] {
+        let mut slabs = [f32::INFINITY; PointBlock::WIDTH];
+        if let Some((codes, radii)) = self.dense_block(block) {
+            for lane in 0..PointBlock::WIDTH {
+                let is_ball = DENSE_SHARES[usize::from(codes[lane].0)] > 0.0;
+                slabs[lane] = if is_ball { f32::INFINITY } else { SLAB * radii[lane] };
+            }
+        } else {
+            for (slab, i) in slabs.iter_mut().zip(self.points_of(block)) {
+                if self.is_on_sheet(i) {
+                    *slab = SLAB * self.radii[i];
+                }
+            }
+        }
+        slabs
     }
 
     /// Returns the codes and the radii of a full block without sparse points.

@@ -1,91 +1,63 @@
 //! Lower bounds on the distance of obstacles, from the points of a leaf.
 //!
-//! No part of the obstacle is further from its nearest point than that point's reach
-//! ([`ScanArrays::obstacle_reach`]). So balls of these radii about the points of a leaf contain its
-//! part of the obstacle. If a leaf spans a gap, such as a silhouette in a depth frame, or contains
-//! strays, its box is mostly empty and these balls give a much better bound.
+//! The part of a point in the obstacle is in a ball about the point and, if it is on a sheet, in a
+//! slab about its tangent plane ([`ObstacleParts`]). So a leaf's
+//! part of the obstacle is in the union of these cut balls. They give a much better bound than the box of
+//! the leaf if that is mostly empty, as at a silhouette in a depth frame or between strays, and a better one
+//! wherever two sheets face each other.
 
 use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{NodePair, OrientedBox, Part, Relative, ScanArrays};
-use nearmiss_lanes::wide::{bits, blocks_of, lanes_of, load};
+use nearmiss_hierarchy::{NodePair, ObstacleParts, OrientedBox, Part, Relative, ScanArrays};
+use nearmiss_lanes::wide::{Vectors, along, bits, blocks_of, lanes_of, load, product, squared};
 
 use crate::pair::pairing::Pairing;
 use crate::pair::scan_pair::ScanPair;
 
-/// Points of a leaf in lanes, in one of the two stored frames, with the reach of the obstacle about
-/// each.
+/// What the square of a sine may be too small by: normals are unit up to rounding, and a turned one likewise.
+const SINE_SQ: f32 = 1e-4;
+
+/// Balls in lanes.
 #[derive(Clone, Copy)]
 struct Balls<S: Simd> {
-    centres: [f32x16<S>; 3],
-    reaches: f32x16<S>,
-    /// The lanes that belong to the leaf, as a bit mask.
+    centres: Vectors<S>,
+    radii: f32x16<S>,
+    /// The lanes in use, as a bit mask.
     lanes: u32,
 }
 
+/// The cut balls about the points of a leaf that contain its part of the obstacle, in lanes, in one of the two
+/// stored frames.
+#[derive(Clone, Copy)]
+struct CutBalls<S: Simd> {
+    balls: Balls<S>,
+    normals: Vectors<S>,
+    /// Half the thicknesses of the slabs; infinite for whole balls.
+    slabs: f32x16<S>,
+    /// The radii of the circles in which the faces of the slabs meet the balls.
+    faces: f32x16<S>,
+}
+
 impl<S: Simd> Balls<S> {
+    /// The vectors to the balls' centres from the nearest places of a box.
     #[inline(always)]
-    fn of(simd: S, scan: &ScanArrays<'_>, leaf: &Range<usize>, block: usize) -> Self {
-        let lanes = lanes_of(block, leaf);
-        let reaches = f32x16::load_array_ref(simd, &scan.obstacle_reaches(block));
-        Self { centres: load(simd, &scan.blocks[block].position), reaches, lanes }
-    }
-
-    /// The balls of a, moved into b's frame.
-    #[inline(always)]
-    fn moved_back(self, relative: &Relative) -> Self {
-        let centres = relative.points_back(&self.centres);
-        Self { centres, reaches: self.reaches * relative.scale_back(), ..self }
-    }
-
-    /// The balls of b, moved into a's frame.
-    #[inline(always)]
-    fn moved(self, relative: &Relative) -> Self {
-        let centres = relative.points(&self.centres);
-        Self { centres, reaches: self.reaches * relative.scale(), ..self }
-    }
-
-    /// The least distance of any ball from the box.
-    #[inline(always)]
-    fn gap_to_box(&self, simd: S, bounds: &OrientedBox) -> f32 {
-        self.least(simd, self.gaps_to_box(simd, bounds))
-    }
-
-    /// The distance of each ball from the box.
-    #[inline(always)]
-    fn gaps_to_box(&self, simd: S, bounds: &OrientedBox) -> f32x16<S> {
+    fn from_box(&self, simd: S, bounds: &OrientedBox) -> Vectors<S> {
         let d = self.seen_from(bounds.centre);
-        let mut beyond_sq = f32x16::splat(simd, 0.0);
+        let mut away = [f32x16::splat(simd, 0.0); 3];
         for k in 0..3 {
-            let [x, y, z] = bounds.axes[k];
-            let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(0.0);
-            beyond_sq += beyond * beyond;
+            let axis = bounds.axes[k];
+            let at = along(d, axis);
+            let beyond = (at.abs() - bounds.half[k]).max(0.0).copysign(at);
+            away = [away[0] + beyond * axis[0], away[1] + beyond * axis[1], away[2] + beyond * axis[2]];
         }
-        beyond_sq.sqrt() - self.reaches
-    }
-
-    /// The least distance of any ball from any of `others`, in the same frame.
-    #[inline(always)]
-    fn gap_to_balls(&self, simd: S, others: &Self) -> f32 {
-        let [x, y, z] = [0, 1, 2].map(|k| others.centres[k].to_array());
-        let reaches = others.reaches.to_array();
-        let mut nearest = f32x16::splat(simd, f32::INFINITY);
-        let mut left = others.lanes;
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let d = self.seen_from([x[lane], y[lane], z[lane]]);
-            let away = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            nearest = nearest.min(away - reaches[lane]);
-        }
-        self.least(simd, nearest - self.reaches)
+        away
     }
 
     #[inline(always)]
-    fn seen_from(&self, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
+    fn seen_from(&self, [x, y, z]: [f32; 3]) -> Vectors<S> {
         [self.centres[0] - x, self.centres[1] - y, self.centres[2] - z]
     }
 
@@ -94,6 +66,109 @@ impl<S: Simd> Balls<S> {
         let there = mask32x16::from_bitmask(simd, u64::from(self.lanes));
         there.select(of, f32x16::splat(simd, f32::INFINITY)).reduce_min()
     }
+}
+
+impl<S: Simd> CutBalls<S> {
+    #[inline(always)]
+    fn of(simd: S, scan: &ScanArrays<'_>, leaf: &Range<usize>, block: usize) -> Self {
+        let ObstacleParts { normals, reaches, slabs } = scan.obstacle_parts(block);
+        let (radii, slabs) = (f32x16::load_array_ref(simd, &reaches), f32x16::load_array_ref(simd, &slabs));
+        let centres = load(simd, &scan.blocks[block].position);
+        let faces = (radii * radii - slabs * slabs).max(0.0).sqrt();
+        let balls = Balls { centres, radii, lanes: lanes_of(block, leaf) };
+        Self { balls, normals: load(simd, &normals), slabs, faces }
+    }
+
+    /// Those of a, moved into b's frame.
+    #[inline(always)]
+    fn moved_back(self, relative: &Relative) -> Self {
+        let centres = relative.points_back(&self.balls.centres);
+        let normals = relative.directions_back(&self.normals);
+        self.scaled(centres, normals, relative.scale_back())
+    }
+
+    /// Those of b, moved into a's frame.
+    #[inline(always)]
+    fn moved(self, relative: &Relative) -> Self {
+        let centres = relative.points(&self.balls.centres);
+        let normals = relative.directions(&self.normals);
+        self.scaled(centres, normals, relative.scale())
+    }
+
+    #[inline(always)]
+    fn scaled(self, centres: Vectors<S>, normals: Vectors<S>, scale: f32) -> Self {
+        let balls = Balls { centres, radii: self.balls.radii * scale, lanes: self.balls.lanes };
+        Self { balls, normals, slabs: self.slabs * scale, faces: self.faces * scale }
+    }
+
+    /// The least distance of any cut ball from the box.
+    #[inline(always)]
+    fn gap_to_box(&self, simd: S, bounds: &OrientedBox) -> f32 {
+        let away = self.balls.from_box(simd, bounds);
+        let square = squared(away);
+        // A ball that overlaps the box has no direction, and the bound is below zero.
+        let per_length = 1.0 / square.max(f32::MIN_POSITIVE).sqrt();
+        let cosine = (product(away, self.normals) * per_length).abs();
+        let extent = extent(cosine, [self.balls.radii, self.slabs, self.faces]);
+        self.balls.least(simd, square.sqrt() - extent)
+    }
+
+    /// The least distance of any cut ball from any of `others`, in the same frame. Returns a smaller bound
+    /// early if that is at least `enough`.
+    #[inline(always)]
+    fn gap_to_others(&self, simd: S, others: &Self, enough: f32) -> f32 {
+        let [x, y, z] = stored(&others.balls.centres);
+        let [nx, ny, nz] = stored(&others.normals);
+        let radii = others.balls.radii.to_array();
+        let (slabs, faces) = (others.slabs.to_array(), others.faces.to_array());
+        let there = mask32x16::from_bitmask(simd, u64::from(self.balls.lanes));
+        let mut nearest = f32x16::splat(simd, f32::INFINITY);
+        let mut left = others.balls.lanes;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let d = self.balls.seen_from([x[lane], y[lane], z[lane]]);
+            let square = squared(d);
+            let away = square.sqrt();
+            let of_balls = away - self.balls.radii - radii[lane];
+            // Not `<`, which would be false for NaN.
+            let is_enough: mask32x16<S> = of_balls.simd_ge(enough);
+            if bits(there & !is_enough) == 0 {
+                nearest = nearest.min(of_balls);
+                continue;
+            }
+            let per_length = 1.0 / away.max(f32::MIN_POSITIVE);
+            let own = (product(d, self.normals) * per_length).abs();
+            let other = (along(d, [nx[lane], ny[lane], nz[lane]]) * per_length).abs();
+            let own = extent(own, [self.balls.radii, self.slabs, self.faces]);
+            let other = extent(
+                other,
+                [
+                    f32x16::splat(simd, radii[lane]),
+                    f32x16::splat(simd, slabs[lane]),
+                    f32x16::splat(simd, faces[lane]),
+                ],
+            );
+            nearest = nearest.min(away - own - other);
+        }
+        self.balls.least(simd, nearest)
+    }
+}
+
+#[inline(always)]
+fn stored<S: Simd>([x, y, z]: &Vectors<S>) -> [[f32; 16]; 3] {
+    [x.to_array(), y.to_array(), z.to_array()]
+}
+
+/// How far cut balls, with these radii, slabs and faces, extend from their centres in a direction, given the
+/// absolute cosine of the direction and their normals.
+///
+/// The furthest place is that of the ball if the slab holds it, and on the rim of a face otherwise.
+#[inline(always)]
+fn extent<S: Simd>(cosine: f32x16<S>, [radii, slabs, faces]: [f32x16<S>; 3]) -> f32x16<S> {
+    let sine = ((1.0 - cosine * cosine).max(0.0) + SINE_SQ).sqrt();
+    let is_cut: mask32x16<S> = (cosine * radii).simd_gt(slabs);
+    is_cut.select((slabs * cosine + faces * sine).min(radii), radii)
 }
 
 /// A lower bound on the distance of a leaf's part of the obstacle from a box in the scan's stored
@@ -110,7 +185,7 @@ pub(crate) fn gap_of_leaf_and_box(
         || {
             let mut least = f32::INFINITY;
             for block in blocks_of(points) {
-                least = least.min(Balls::of(simd, scan, points, block).gap_to_box(simd, bounds));
+                least = least.min(CutBalls::of(simd, scan, points, block).gap_to_box(simd, bounds));
             }
             least
         },
@@ -128,10 +203,11 @@ pub(crate) fn near_box(
     dispatch!(level, simd => simd.vectorize(
         #[inline(always)]
         || {
-            let reaches = f32x16::load_array_ref(simd, balls);
-            let balls = Balls { centres: load(simd, positions), reaches, lanes };
+            let radii = f32x16::load_array_ref(simd, balls);
+            let balls = Balls { centres: load(simd, positions), radii, lanes };
+            let gaps = squared(balls.from_box(simd, bounds)).sqrt() - radii;
             // Not `<=`, which would be false for NaN.
-            let beyond: mask32x16<_> = balls.gaps_to_box(simd, bounds).simd_gt(most);
+            let beyond: mask32x16<_> = gaps.simd_gt(most);
             lanes & !bits(beyond)
         },
     ))
@@ -160,7 +236,7 @@ impl ScanPair<'_> {
     pub(crate) fn gap_by_points(&self, pair: NodePair) -> Option<f32> {
         let [a, b] = self.which_are_leaves(pair);
         if a && b {
-            return Some(self.gap_of_leaves(pair));
+            return Some(self.gap_of_leaves(pair, f32::INFINITY));
         }
         let is_loose = |scan: &ScanArrays<'_>, leaf: NodeId| {
             scan.leaves.is_loose(scan.tree.topology().leaf_number(leaf))
@@ -207,7 +283,7 @@ impl ScanPair<'_> {
             let leaf = &self.a.tree.topology().points(pair.a);
             let bounds = self.b.tree.enclosure(Part::Obstacle, pair.b);
             for block in blocks_of(leaf) {
-                let balls = Balls::of(simd, self.a, leaf, block).moved_back(&self.relative);
+                let balls = CutBalls::of(simd, self.a, leaf, block).moved_back(&self.relative);
                 least = least.min(balls.gap_to_box(simd, &bounds));
             }
             return least * self.relative.scale();
@@ -215,31 +291,32 @@ impl ScanPair<'_> {
         let leaf = &self.b.tree.topology().points(pair.b);
         let bounds = self.a.tree.enclosure(Part::Obstacle, pair.a);
         for block in blocks_of(leaf) {
-            let balls = Balls::of(simd, self.b, leaf, block).moved(&self.relative);
+            let balls = CutBalls::of(simd, self.b, leaf, block).moved(&self.relative);
             least = least.min(balls.gap_to_box(simd, &bounds));
         }
         least
     }
 
-    /// The same for two leaves, from the points of both.
-    pub(crate) fn gap_of_leaves(&self, pair: NodePair) -> f32 {
+    /// The same for two leaves, from the points of both. Returns a smaller bound early if that is at least
+    /// `enough`.
+    pub(crate) fn gap_of_leaves(&self, pair: NodePair, enough: f32) -> f32 {
         let level = self.level;
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.gap_of_leaves_by(simd, pair),
+            || self.gap_of_leaves_by(simd, pair, enough),
         ))
     }
 
     #[inline(always)]
-    fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair) -> f32 {
+    fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair, enough: f32) -> f32 {
         let (leaf_a, leaf_b) =
             (&self.a.tree.topology().points(pair.a), &self.b.tree.topology().points(pair.b));
         let mut least = f32::INFINITY;
         for block_b in blocks_of(leaf_b) {
-            let of_b = Balls::of(simd, self.b, leaf_b, block_b).moved(&self.relative);
+            let of_b = CutBalls::of(simd, self.b, leaf_b, block_b).moved(&self.relative);
             for block_a in blocks_of(leaf_a) {
-                let of_a = Balls::of(simd, self.a, leaf_a, block_a);
-                least = least.min(of_a.gap_to_balls(simd, &of_b));
+                let of_a = CutBalls::of(simd, self.a, leaf_a, block_a);
+                least = least.min(of_a.gap_to_others(simd, &of_b, enough));
             }
         }
         least

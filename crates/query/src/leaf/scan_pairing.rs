@@ -69,8 +69,8 @@ impl Pairing for ScanPair<'_> {
         Self::gap_of_leaf_boxes(self, pair)
     }
 
-    fn gap_of_leaves(&self, pair: NodePair) -> f32 {
-        Self::gap_of_leaves(self, pair)
+    fn gap_of_leaves(&self, pair: NodePair, enough: f32) -> f32 {
+        Self::gap_of_leaves(self, pair, enough)
     }
 
     fn items(&self, items: [usize; 2]) -> ItemPair {

@@ -18,8 +18,8 @@ const WIDTH: usize = PointBlock::WIDTH;
 const EXACT: u64 = 2;
 
 impl MeshScanPairing<'_> {
-    /// A lower bound on the distance of two leaves: of each triangle from the enclosure of the
-    /// points and, for obstacles, from the points less their reaches.
+    /// A lower bound on the distance of two leaves: of each triangle from the enclosure of the points and, for
+    /// obstacles, from the parts of the points.
     pub(crate) fn gap_of_two_leaves(&self, pair: NodePair) -> f32 {
         let leaf = self.b.tree.topology().leaf_number(pair.b);
         let (triangles, lanes) = (self.triangles(leaf), self.lanes(leaf).0);
@@ -30,8 +30,8 @@ impl MeshScanPairing<'_> {
         let points = &self.a.tree.topology().points(pair.a);
         let mut least = f32::INFINITY;
         for block in blocks_of(points) {
-            let reaches = self.a.obstacle_reaches(block);
-            let of_block = (&self.a.blocks[block].position, &reaches, lanes_of(block, points));
+            let (positions, parts) = (&self.a.blocks[block].position, self.a.obstacle_parts(block));
+            let of_block = (positions, &parts, lanes_of(block, points));
             least = least.min(triangles.least_gap(lanes, &enclosure, Some(of_block)));
         }
         least

@@ -80,7 +80,7 @@ impl Pairing for MeshScanPairing<'_> {
         gap_of_leaf_and_box(self.level, self.a, pair.a, &bounds)
     }
 
-    fn gap_of_leaves(&self, pair: NodePair) -> f32 {
+    fn gap_of_leaves(&self, pair: NodePair, _: f32) -> f32 {
         self.gap_of_two_leaves(pair)
     }
 

@@ -5,7 +5,9 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x4, mask32x16};
-use nearmiss_hierarchy::{LEAF_TRIANGLES, LeafBlock, OrientedBox, Relative, THICKNESS, TriangleBlock};
+use nearmiss_hierarchy::{
+    LEAF_TRIANGLES, LeafBlock, ObstacleParts, OrientedBox, Relative, THICKNESS, TriangleBlock,
+};
 use nearmiss_lanes::wide::{Vectors, along, bits, cross, load, product, squared};
 
 /// Coordinates beyond this have squares near the end of single precision.
@@ -25,8 +27,11 @@ const OF_EDGES: f32 = 4e-6;
 /// The number of steps of a position or normal in a [`LeafBlock`].
 const STEPS: f32 = 32767.0;
 
-/// The positions and the reaches of the points of a block, and the lanes in use.
+/// The positions and the balls of the points of a block, and the lanes in use.
 type Reaching<'a> = (&'a [[f32; 16]; 3], &'a [f32; 16], u32);
+
+/// The positions of the points of a block, what contains the obstacle near them, and the lanes in use.
+type ReachingParts<'a> = (&'a [[f32; 16]; 3], &'a ObstacleParts, u32);
 
 /// One number for each triangle of a leaf.
 type Four = [f32; LEAF_TRIANGLES];
@@ -209,6 +214,26 @@ impl LaneTriangle {
         nearest.sqrt() * (1.0 - RELATIVE) - self.off
     }
 
+    /// The least and the greatest heights of the corners over the planes of these points, and the sum of the
+    /// coordinates of the way to the furthest corner.
+    #[inline(always)]
+    fn heights<S: Simd>(
+        &self,
+        simd: S,
+        points: &Vectors<S>,
+        normals: &Vectors<S>,
+    ) -> (f32x16<S>, f32x16<S>, f32x16<S>) {
+        let (mut low, mut far) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, 0.0));
+        let mut high = -low;
+        for [cx, cy, cz] in self.corners {
+            let d = [-(points[0] - cx), -(points[1] - cy), -(points[2] - cz)];
+            let height = product(d, *normals);
+            (low, high) = (low.min(height), high.max(height));
+            far = far.max(d[0].abs() + d[1].abs() + d[2].abs());
+        }
+        (low, high, far)
+    }
+
     /// The lanes of discs that may be within their thickness or within `reach` of the triangle, as
     /// a bit mask.
     #[inline(always)]
@@ -216,16 +241,8 @@ impl LaneTriangle {
         let (positions, normals, discs) = (block.positions(simd), block.normals(simd), block.discs(simd));
         let step = step_of(block);
         let thick = (discs * THICKNESS).max(reach);
-        // Heights of the corners over the planes of the discs. Normals are off by less than a step
-        // in each component.
-        let (mut low, mut far) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, 0.0));
-        let mut high = -low;
-        for [cx, cy, cz] in self.corners {
-            let d = [-(positions[0] - cx), -(positions[1] - cy), -(positions[2] - cz)];
-            let height = product(d, normals);
-            (low, high) = (low.min(height), high.max(height));
-            far = far.max(d[0].abs() + d[1].abs() + d[2].abs());
-        }
+        let (low, high, far) = self.heights(simd, &positions, &normals);
+        // Normals are off by less than a step in each component.
         let most = thick + far * (1.3 / STEPS) + (step + self.off);
         let beside: mask32x16<S> = low.simd_gt(most) | high.simd_lt(-most);
         if bits(beside) == 0xffff {
@@ -353,9 +370,14 @@ impl LeafTriangles<'_> {
     }
 
     /// The least gap of the triangles in `lanes` and an enclosure of points: for each triangle its
-    /// gap along the axes of the enclosure or, if that is greater, its least distance from a point
-    /// less the reach of the point. `points` has positions, reaches and the lanes in use.
-    pub(crate) fn least_gap(&self, lanes: u32, enclosure: &OrientedBox, points: Option<Reaching<'_>>) -> f32 {
+    /// gap along the axes of the enclosure or, if that is greater, its least distance from the part of a
+    /// point.
+    pub(crate) fn least_gap(
+        &self,
+        lanes: u32,
+        enclosure: &OrientedBox,
+        points: Option<ReachingParts<'_>>,
+    ) -> f32 {
         dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
             || self.least_gap_by(simd, lanes, enclosure, points),
@@ -368,17 +390,22 @@ impl LeafTriangles<'_> {
         simd: S,
         lanes: u32,
         enclosure: &OrientedBox,
-        points: Option<Reaching<'_>>,
+        points: Option<ReachingParts<'_>>,
     ) -> f32 {
         let (corners, slack) = (self.corners(simd), self.relative.slack());
         let gaps = gaps_to_box(simd, &corners, enclosure) - 2.0 * slack;
         let mut gaps = gaps.to_array();
-        if let Some((positions, reaches, used)) = points {
+        if let Some((positions, parts, used)) = points {
             let prepared = Prepared::new(simd, corners, slack);
-            let (positions, reaches) = (load(simd, positions), f32x16::load_array_ref(simd, reaches));
+            let (positions, normals) = (load(simd, positions), load(simd, &parts.normals));
+            let reaches = f32x16::load_array_ref(simd, &parts.reaches);
+            let slabs = f32x16::load_array_ref(simd, &parts.slabs);
             let there = mask32x16::from_bitmask(simd, u64::from(used));
             for lane in 0..LEAF_TRIANGLES {
-                let own = prepared.get(lane).distances(simd, &positions) - reaches;
+                let triangle = prepared.get(lane);
+                let (low, high, far) = triangle.heights(simd, &positions, &normals);
+                let beside = low.max(-high) - slabs - far * RELATIVE - triangle.off;
+                let own = (triangle.distances(simd, &positions) - reaches).max(beside);
                 let least = there.select(own, f32x16::splat(simd, f32::INFINITY)).reduce_min();
                 gaps[lane] = if least > gaps[lane] { least } else { gaps[lane] };
             }
