@@ -143,10 +143,12 @@ fn distance_along(a: &Placed, b: &Placed, direction: Vector, wanted: f64) -> Opt
     holds.then(|| between.low / length.high)
 }
 
-/// Returns the face normals of both boxes and the common normals of their edges.
+/// Returns the face normals of both boxes, the common normals of their edges and the normals of slabs.
 fn normals(a: &Placed, b: &Placed) -> Vec<Vector> {
-    let mut normals = Vec::with_capacity(16);
+    let mut normals = Vec::with_capacity(18);
     for box_ in [a, b] {
+        let cut = box_.part.and_then(|part| part.cut);
+        normals.extend(cut.map(|(normal, _)| normal.map(middle)));
         let [x, y, z] = box_.directions;
         normals.extend([cross(y, z), cross(z, x), cross(x, y)]);
     }
@@ -289,5 +291,55 @@ mod tests {
             }
         }
         assert!(apart > 1500, "most are far apart: {apart}");
+    }
+
+    /// The extent of a part is the greatest of the places on its outline.
+    #[test]
+    fn parts_extend_as_far_as_their_places() {
+        let mut source = Source::new(7);
+        let (mut cut, mut scale) = (0, 1.0);
+        for round in 0..500 {
+            let mut number = || source.signed();
+            let turn = [number() * 3.0, number() * 3.0];
+            scale = if round % 2 == 0 { 1.0 } else { 1.0 + number().abs() };
+            let mut placing = matrix(turn, [number(), number(), number()]);
+            for i in [0, 1, 2, 4, 5, 6, 8, 9, 10] {
+                placing[i] *= scale;
+            }
+            let (radius, share) = (0.2 + number().abs(), 1.2 * number().abs());
+            let slab = share * radius;
+            let part =
+                Placed::part([0.3, 0.1, 0.2], (radius, Some(([0.0, 0.0, 1.0], slab))), (&placing, scale));
+            let d = [number(), number(), number()];
+            let bound = part.greatest_extent(d.map(Interval::new));
+            let axis = [placing[2], placing[6], placing[10]].map(|x| x / scale);
+            let length = times(d, d).sqrt();
+            let angle = (times(d, axis) / length).clamp(-1.0, 1.0).acos();
+            let outline = |step: u32| {
+                let own = f64::from(step) * std::f64::consts::TAU / 20_000.0;
+                radius.min(slab / own.cos().abs()) * (own - angle).cos() * length * scale
+            };
+            let exact = (0..20_000).map(outline).fold(0.0, f64::max);
+            assert!(
+                bound.high >= exact && bound.high < exact + 5e-4 * radius * length * scale,
+                "{bound:?} {exact}"
+            );
+            cut += usize::from(exact < 0.99 * radius * length * scale);
+        }
+        assert!(cut > 150 && scale > 1.0, "{cut} cut");
+    }
+
+    #[test]
+    fn slabs_that_face_each_other_are_apart_though_their_balls_overlap() {
+        let part = |z: f32, normal: Option<[f32; 3]>| {
+            let cut = normal.map(|normal| (normal, 0.3));
+            Placed::part([0.4, 0.2, z], (1.0, cut), (&matrix([0.0; 2], [0.0; 3]), 1.0))
+        };
+        let up = Some([0.0, 0.0, 1.0]);
+        let origin = Placed::part([0.0; 3], (1.0, up.map(|n| (n, 0.3))), (&matrix([0.0; 2], [0.0; 3]), 1.0));
+        assert!(distance(&origin, &part(0.75, up), 0.15 - 1e-6).is_some(), "both cut");
+        assert!(distance(&origin, &part(0.75, up), 0.15 + 1e-6).is_none(), "not so far");
+        assert!(distance(&origin, &part(0.75, None), 0.0).is_none(), "a whole ball");
+        assert!(distance(&origin, &part(1.5, None), 0.19).is_some(), "a slab and a ball");
     }
 }

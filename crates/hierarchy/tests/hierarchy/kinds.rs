@@ -1,6 +1,6 @@
 //! The kinds of points on clouds of known nature.
 use nearmiss_geometry::PointCloud;
-use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind, SLAB};
 use nearmiss_testdata::arbitrary::{gaussian, point_in, rng};
 use nearmiss_testdata::scanner::{self, Frame};
 
@@ -107,4 +107,33 @@ fn nothing_is_interpolated_beyond_the_reach() {
     let cloud = PointCloud::from_positions(&points).unwrap();
     let wide = PointHierarchy::build(&cloud, &BuildOptions::default().with_reach(12.0)).unwrap();
     assert!(wide.share(PointKind::Stray) < 1e-9 && wide.share(PointKind::Sheet) > 0.9);
+}
+
+/// The parts of a block are those of its points: a ball about each and, on a sheet, a slab.
+#[test]
+fn parts_of_blocks_are_those_of_points() {
+    let mut rng = rng(6);
+    let mut points = lattice(40, 0.05, |x, y| 0.1 * (3.0 * x).sin() * y);
+    points.extend((0..700).map(|_| point_in(&mut rng, 0.4).map(|x| x + 5.0)));
+    points.extend((0..30).map(|_| point_in(&mut rng, 6.0)));
+    let (scan, mut counts) = (prepared(&points), [0; 2]);
+    let arrays = scan.arrays();
+    for block in 0..arrays.blocks.len() {
+        let parts = arrays.obstacle_parts(block);
+        for lane in 0..16 {
+            let i = 16 * block + lane;
+            if i >= scan.len() {
+                assert_eq!(parts.reaches[lane].to_bits(), 0, "unused");
+                continue;
+            }
+            assert_eq!(parts.normals.map(|row| row[lane]), scan.normals()[i]);
+            let reach = arrays.obstacle_reach(i);
+            assert!((reach..1.01 * reach).contains(&parts.reaches[lane]), "{reach} {}", parts.reaches[lane]);
+            let is_sheet = arrays.is_on_sheet(i);
+            let slab = if is_sheet { SLAB * scan.radii()[i] } else { f32::INFINITY };
+            assert_eq!(parts.slabs[lane].to_bits(), slab.to_bits(), "point {i}");
+            counts[usize::from(is_sheet)] += 1;
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 300), "{counts:?}");
 }

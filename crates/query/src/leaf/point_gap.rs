@@ -44,7 +44,7 @@ struct CutBalls<S: Simd> {
 impl<S: Simd> Balls<S> {
     /// The vectors to the balls' centres from the nearest places of a box.
     #[inline(always)]
-    fn from_box(&self, simd: S, bounds: &OrientedBox) -> Vectors<S> {
+    fn away_from_box(&self, simd: S, bounds: &OrientedBox) -> Vectors<S> {
         let d = self.seen_from(bounds.centre);
         let mut away = [f32x16::splat(simd, 0.0); 3];
         for k in 0..3 {
@@ -104,13 +104,17 @@ impl<S: Simd> CutBalls<S> {
     /// The least distance of any cut ball from the box.
     #[inline(always)]
     fn gap_to_box(&self, simd: S, bounds: &OrientedBox) -> f32 {
-        let away = self.balls.from_box(simd, bounds);
+        let away = self.balls.away_from_box(simd, bounds);
         let square = squared(away);
         // A ball that overlaps the box has no direction, and the bound is below zero.
         let per_length = 1.0 / square.max(f32::MIN_POSITIVE).sqrt();
         let cosine = (product(away, self.normals) * per_length).abs();
-        let extent = extent(cosine, [self.balls.radii, self.slabs, self.faces]);
-        self.balls.least(simd, square.sqrt() - extent)
+        let by_way = square.sqrt() - extent(cosine, [self.balls.radii, self.slabs, self.faces]);
+        let mut by_normal = product(self.balls.seen_from(bounds.centre), self.normals).abs() - self.slabs;
+        for k in 0..3 {
+            by_normal -= along(self.normals, bounds.axes[k]).abs() * bounds.half[k];
+        }
+        self.balls.least(simd, by_way.max(by_normal))
     }
 
     /// The least distance of any cut ball from any of `others`, in the same frame. Returns a smaller bound
@@ -137,19 +141,21 @@ impl<S: Simd> CutBalls<S> {
                 nearest = nearest.min(of_balls);
                 continue;
             }
+            let normal = [nx[lane], ny[lane], nz[lane]];
+            let other = [
+                f32x16::splat(simd, radii[lane]),
+                f32x16::splat(simd, slabs[lane]),
+                f32x16::splat(simd, faces[lane]),
+            ];
+            let own = [self.balls.radii, self.slabs, self.faces];
+            // Along the way between the centres, and along the normal of either.
             let per_length = 1.0 / away.max(f32::MIN_POSITIVE);
-            let own = (product(d, self.normals) * per_length).abs();
-            let other = (along(d, [nx[lane], ny[lane], nz[lane]]) * per_length).abs();
-            let own = extent(own, [self.balls.radii, self.slabs, self.faces]);
-            let other = extent(
-                other,
-                [
-                    f32x16::splat(simd, radii[lane]),
-                    f32x16::splat(simd, slabs[lane]),
-                    f32x16::splat(simd, faces[lane]),
-                ],
-            );
-            nearest = nearest.min(away - own - other);
+            let (of_own, of_other) = (product(d, self.normals).abs(), along(d, normal).abs());
+            let by_way = away - extent(of_own * per_length, own) - extent(of_other * per_length, other);
+            let cosine = along(self.normals, normal).abs();
+            let by_own = of_own - self.slabs - extent(cosine, other);
+            let by_other = of_other - slabs[lane] - extent(cosine, own);
+            nearest = nearest.min(by_way.max(by_own).max(by_other));
         }
         self.balls.least(simd, nearest)
     }
@@ -205,7 +211,7 @@ pub(crate) fn near_box(
         || {
             let radii = f32x16::load_array_ref(simd, balls);
             let balls = Balls { centres: load(simd, positions), radii, lanes };
-            let gaps = squared(balls.from_box(simd, bounds)).sqrt() - radii;
+            let gaps = squared(balls.away_from_box(simd, bounds)).sqrt() - radii;
             // Not `<=`, which would be false for NaN.
             let beyond: mask32x16<_> = gaps.simd_gt(most);
             lanes & !bits(beyond)
@@ -322,3 +328,6 @@ impl ScanPair<'_> {
         least
     }
 }
+
+#[cfg(test)]
+mod tests;
