@@ -215,7 +215,7 @@ fn a_turning_bar_hits_a_post_at_its_far_end() {
     let answer = question.answer();
     question.check(&answer, 500, "above");
     let SweepVerdict::Free { clearance, upper, .. } = answer.verdict else { panic!("{answer:?}") };
-    assert!(clearance > 0.3 && clearance <= 1.0 && upper < 1.2, "{answer:?}");
+    assert!(clearance > 0.8 && clearance <= 1.0 && upper >= 1.0 && upper < 1.4, "{answer:?}");
 }
 
 #[test]
@@ -361,6 +361,10 @@ fn budgets_end_a_sweep_with_what_is_proven() {
     let mut scratch = Scratch::default();
     let whole = question.within(&Budget::UNLIMITED, &mut scratch);
     assert!(whole.verdict.is_impact(), "{whole:?}");
+    let times = |verdict: &SweepVerdict| match *verdict {
+        SweepVerdict::Impact { t_free, t_hit, .. } => Some([t_free, t_hit]),
+        _ => None,
+    };
     let (mut last, mut cut) = (0.0, 0);
     for work in [0, 100, 500, 1000, 2000, 4000, 8000, 1_000_000] {
         let budget = Budget::UNLIMITED.with_work(work);
@@ -373,7 +377,8 @@ fn budgets_end_a_sweep_with_what_is_proven() {
                 cut += 1;
                 last = t_free;
             }
-            _ => assert_eq!(answer.verdict, whole.verdict, "a budget that suffices"),
+            // With a budget nodes are visited in another order, so the contact may be another one.
+            verdict => assert_eq!(times(&verdict), times(&whole.verdict), "a budget that suffices"),
         }
     }
     assert!((2..8).contains(&cut) && last > 0.0, "{cut} sweeps were cut, the last at {last}");
