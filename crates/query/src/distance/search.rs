@@ -211,9 +211,9 @@ impl<'m, P: Pairing> Search<'m, P> {
         if by_boxes >= self.enclosures {
             return by_boxes;
         }
-        #[expect(clippy::cast_possible_truncation, reason = "only how tight a bound has to be")]
-        let enough = self.relative_pose.bound(self.enclosures) as f32;
-        by_enclosures.max(self.relative_pose.no_nearer(f64::from(self.pair.gap_of_leaves(leaves, enough))))
+        #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+        let most = (self.relative_pose.bound(self.enclosures) as f32).next_up();
+        by_enclosures.max(self.relative_pose.no_nearer(f64::from(self.pair.gap_of_leaves(leaves, most))))
     }
 }
 

@@ -117,28 +117,24 @@ impl<S: Simd> CutBalls<S> {
         self.balls.least(simd, by_way.max(by_normal))
     }
 
-    /// The least distance of any cut ball from any of `others`, in the same frame. Returns a smaller bound
-    /// early if that is at least `enough`.
+    /// The least distance of any cut ball from any of `others`, in the same frame; at most `most`.
     #[inline(always)]
-    fn gap_to_others(&self, simd: S, others: &Self, enough: f32) -> f32 {
+    fn gap_to_others(&self, simd: S, others: &Self, most: f32) -> f32 {
         let [x, y, z] = stored(&others.balls.centres);
         let [nx, ny, nz] = stored(&others.normals);
         let radii = others.balls.radii.to_array();
         let (slabs, faces) = (others.slabs.to_array(), others.faces.to_array());
         let there = mask32x16::from_bitmask(simd, u64::from(self.balls.lanes));
-        let mut nearest = f32x16::splat(simd, f32::INFINITY);
-        let mut left = others.balls.lanes;
+        let (mut least, mut left) = (most, others.balls.lanes);
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
             let d = self.balls.seen_from([x[lane], y[lane], z[lane]]);
-            let square = squared(d);
-            let away = square.sqrt();
+            let away = squared(d).sqrt();
             let of_balls = away - self.balls.radii - radii[lane];
-            // Not `<`, which would be false for NaN.
-            let is_enough: mask32x16<S> = of_balls.simd_ge(enough);
-            if bits(there & !is_enough) == 0 {
-                nearest = nearest.min(of_balls);
+            // Whole balls are a bound as well. Not `<`, which would be false for NaN.
+            let is_beyond: mask32x16<S> = of_balls.simd_ge(least);
+            if bits(there & !is_beyond) == 0 {
                 continue;
             }
             let normal = [nx[lane], ny[lane], nz[lane]];
@@ -155,9 +151,10 @@ impl<S: Simd> CutBalls<S> {
             let cosine = along(self.normals, normal).abs();
             let by_own = of_own - self.slabs - extent(cosine, other);
             let by_other = of_other - slabs[lane] - extent(cosine, own);
-            nearest = nearest.min(by_way.max(by_own).max(by_other));
+            let own = self.balls.least(simd, by_way.max(by_own).max(by_other));
+            least = if own >= least { least } else { own };
         }
-        self.balls.least(simd, nearest)
+        least
     }
 }
 
@@ -303,26 +300,25 @@ impl ScanPair<'_> {
         least
     }
 
-    /// The same for two leaves, from the points of both. Returns a smaller bound early if that is at least
-    /// `enough`.
-    pub(crate) fn gap_of_leaves(&self, pair: NodePair, enough: f32) -> f32 {
+    /// The same for two leaves, from the points of both; at most `most`.
+    pub(crate) fn gap_of_leaves(&self, pair: NodePair, most: f32) -> f32 {
         let level = self.level;
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.gap_of_leaves_by(simd, pair, enough),
+            || self.gap_of_leaves_by(simd, pair, most),
         ))
     }
 
     #[inline(always)]
-    fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair, enough: f32) -> f32 {
+    fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair, most: f32) -> f32 {
         let (leaf_a, leaf_b) =
             (&self.a.tree.topology().points(pair.a), &self.b.tree.topology().points(pair.b));
-        let mut least = f32::INFINITY;
+        let mut least = most;
         for block_b in blocks_of(leaf_b) {
             let of_b = CutBalls::of(simd, self.b, leaf_b, block_b).moved(&self.relative);
             for block_a in blocks_of(leaf_a) {
                 let of_a = CutBalls::of(simd, self.a, leaf_a, block_a);
-                least = least.min(of_a.gap_to_others(simd, &of_b, enough));
+                least = of_a.gap_to_others(simd, &of_b, least);
             }
         }
         least

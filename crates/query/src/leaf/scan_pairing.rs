@@ -69,8 +69,8 @@ impl Pairing for ScanPair<'_> {
         Self::gap_of_leaf_boxes(self, pair)
     }
 
-    fn gap_of_leaves(&self, pair: NodePair, enough: f32) -> f32 {
-        Self::gap_of_leaves(self, pair, enough)
+    fn gap_of_leaves(&self, pair: NodePair, most: f32) -> f32 {
+        Self::gap_of_leaves(self, pair, most)
     }
 
     fn items(&self, items: [usize; 2]) -> ItemPair {

@@ -60,9 +60,8 @@ pub(crate) trait Pairing {
     /// The same for two leaves, from the points or triangles of each and the box of the other.
     fn gap_of_leaf_boxes(&self, pair: NodePair) -> f32;
 
-    /// The same for two leaves, from the points or triangles of both. May be a smaller bound that is at least
-    /// `enough`.
-    fn gap_of_leaves(&self, pair: NodePair, enough: f32) -> f32;
+    /// The same for two leaves, from the points or triangles of both; `most` is enough.
+    fn gap_of_leaves(&self, pair: NodePair, most: f32) -> f32;
 
     /// The items with these numbers.
     fn items(&self, items: [usize; 2]) -> ItemPair;
