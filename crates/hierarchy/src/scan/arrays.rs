@@ -162,9 +162,14 @@ impl ScanArrays<'_> {
         balls
     }
 
-    /// Returns an upper bound of [`Self::obstacle_reach`] for the points in a block; zero in unused lanes.
+    /// Returns an upper bound of [`Self::obstacle_reach`] for the points in a block; 0 in unused
+    /// lanes.
+    ///
+    /// # Panics
+    /// If there is no such block.
     #[inline(always)]
-    fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
+    #[must_use]
+    pub fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
         let mut reaches = self.obstacle_balls(block);
         if let Some((codes, radii)) = self.dense_block(block) {
             for lane in 0..PointBlock::WIDTH {

@@ -42,18 +42,43 @@ struct CutBalls<S: Simd> {
 }
 
 impl<S: Simd> Balls<S> {
-    /// The vectors to the balls' centres from the nearest places of a box.
+    /// The balls about the points of a leaf that contain its part of the obstacle.
     #[inline(always)]
-    fn away_from_box(&self, simd: S, bounds: &OrientedBox) -> Vectors<S> {
+    fn of(simd: S, scan: &ScanArrays<'_>, leaf: &Range<usize>, block: usize) -> Self {
+        let radii = f32x16::load_array_ref(simd, &scan.obstacle_reaches(block));
+        Self { centres: load(simd, &scan.blocks[block].position), radii, lanes: lanes_of(block, leaf) }
+    }
+
+    /// Those of a, moved into b's frame.
+    #[inline(always)]
+    fn moved_back(self, relative: &Relative) -> Self {
+        let centres = relative.points_back(&self.centres);
+        Self { centres, radii: self.radii * relative.scale_back(), ..self }
+    }
+
+    /// Those of b, moved into a's frame.
+    #[inline(always)]
+    fn moved(self, relative: &Relative) -> Self {
+        let centres = relative.points(&self.centres);
+        Self { centres, radii: self.radii * relative.scale(), ..self }
+    }
+
+    /// The least distance of any ball from the box.
+    #[inline(always)]
+    fn gap_to_box(&self, simd: S, bounds: &OrientedBox) -> f32 {
+        self.least(simd, self.gaps_to_box(simd, bounds))
+    }
+
+    /// The distance of each ball from the box.
+    #[inline(always)]
+    fn gaps_to_box(&self, simd: S, bounds: &OrientedBox) -> f32x16<S> {
         let d = self.seen_from(bounds.centre);
-        let mut away = [f32x16::splat(simd, 0.0); 3];
+        let mut beyond_sq = f32x16::splat(simd, 0.0);
         for k in 0..3 {
-            let axis = bounds.axes[k];
-            let at = along(d, axis);
-            let beyond = (at.abs() - bounds.half[k]).max(0.0).copysign(at);
-            away = [away[0] + beyond * axis[0], away[1] + beyond * axis[1], away[2] + beyond * axis[2]];
+            let beyond = (along(d, bounds.axes[k]).abs() - bounds.half[k]).max(0.0);
+            beyond_sq += beyond * beyond;
         }
-        away
+        beyond_sq.sqrt() - self.radii
     }
 
     #[inline(always)]
@@ -79,42 +104,12 @@ impl<S: Simd> CutBalls<S> {
         Self { balls, normals: load(simd, &normals), slabs, faces }
     }
 
-    /// Those of a, moved into b's frame.
-    #[inline(always)]
-    fn moved_back(self, relative: &Relative) -> Self {
-        let centres = relative.points_back(&self.balls.centres);
-        let normals = relative.directions_back(&self.normals);
-        self.scaled(centres, normals, relative.scale_back())
-    }
-
     /// Those of b, moved into a's frame.
     #[inline(always)]
     fn moved(self, relative: &Relative) -> Self {
-        let centres = relative.points(&self.balls.centres);
-        let normals = relative.directions(&self.normals);
-        self.scaled(centres, normals, relative.scale())
-    }
-
-    #[inline(always)]
-    fn scaled(self, centres: Vectors<S>, normals: Vectors<S>, scale: f32) -> Self {
-        let balls = Balls { centres, radii: self.balls.radii * scale, lanes: self.balls.lanes };
+        let (normals, scale) = (relative.directions(&self.normals), relative.scale());
+        let balls = self.balls.moved(relative);
         Self { balls, normals, slabs: self.slabs * scale, faces: self.faces * scale }
-    }
-
-    /// The least distance of any cut ball from the box.
-    #[inline(always)]
-    fn gap_to_box(&self, simd: S, bounds: &OrientedBox) -> f32 {
-        let away = self.balls.away_from_box(simd, bounds);
-        let square = squared(away);
-        // A ball that overlaps the box has no direction, and the bound is below zero.
-        let per_length = 1.0 / square.max(f32::MIN_POSITIVE).sqrt();
-        let cosine = (product(away, self.normals) * per_length).abs();
-        let by_way = square.sqrt() - extent(cosine, [self.balls.radii, self.slabs, self.faces]);
-        let mut by_normal = product(self.balls.seen_from(bounds.centre), self.normals).abs() - self.slabs;
-        for k in 0..3 {
-            by_normal -= along(self.normals, bounds.axes[k]).abs() * bounds.half[k];
-        }
-        self.balls.least(simd, by_way.max(by_normal))
     }
 
     /// The least distance of any cut ball from any of `others`, in the same frame; at most `most`.
@@ -188,7 +183,7 @@ pub(crate) fn gap_of_leaf_and_box(
         || {
             let mut least = f32::INFINITY;
             for block in blocks_of(points) {
-                least = least.min(CutBalls::of(simd, scan, points, block).gap_to_box(simd, bounds));
+                least = least.min(Balls::of(simd, scan, points, block).gap_to_box(simd, bounds));
             }
             least
         },
@@ -208,9 +203,8 @@ pub(crate) fn near_box(
         || {
             let radii = f32x16::load_array_ref(simd, balls);
             let balls = Balls { centres: load(simd, positions), radii, lanes };
-            let gaps = squared(balls.away_from_box(simd, bounds)).sqrt() - radii;
             // Not `<=`, which would be false for NaN.
-            let beyond: mask32x16<_> = gaps.simd_gt(most);
+            let beyond: mask32x16<_> = balls.gaps_to_box(simd, bounds).simd_gt(most);
             lanes & !bits(beyond)
         },
     ))
@@ -286,7 +280,7 @@ impl ScanPair<'_> {
             let leaf = &self.a.tree.topology().points(pair.a);
             let bounds = self.b.tree.enclosure(Part::Obstacle, pair.b);
             for block in blocks_of(leaf) {
-                let balls = CutBalls::of(simd, self.a, leaf, block).moved_back(&self.relative);
+                let balls = Balls::of(simd, self.a, leaf, block).moved_back(&self.relative);
                 least = least.min(balls.gap_to_box(simd, &bounds));
             }
             return least * self.relative.scale();
@@ -294,7 +288,7 @@ impl ScanPair<'_> {
         let leaf = &self.b.tree.topology().points(pair.b);
         let bounds = self.a.tree.enclosure(Part::Obstacle, pair.a);
         for block in blocks_of(leaf) {
-            let balls = CutBalls::of(simd, self.b, leaf, block).moved(&self.relative);
+            let balls = Balls::of(simd, self.b, leaf, block).moved(&self.relative);
             least = least.min(balls.gap_to_box(simd, &bounds));
         }
         least
