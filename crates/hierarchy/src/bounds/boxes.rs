@@ -184,9 +184,14 @@ impl Relative {
     #[must_use]
     pub fn points_back<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
         let [tx, ty, tz] = self.translation;
-        let [x, y, z] = self.directions_back(&[points[0] - tx, points[1] - ty, points[2] - tz]);
+        let (x, y, z) = (points[0] - tx, points[1] - ty, points[2] - tz);
+        let [rx, ry, rz] = self.rotation;
         let back = self.scale_back();
-        [x * back, y * back, z * back]
+        [
+            (x * rx[0] + y * ry[0] + z * rz[0]) * back,
+            (x * rx[1] + y * ry[1] + z * rz[1]) * back,
+            (x * rx[2] + y * ry[2] + z * rz[2]) * back,
+        ]
     }
 
     /// Transforms sixteen points of b's frame to a's.
@@ -196,18 +201,6 @@ impl Relative {
         let [x, y, z] = turned(&self.linear, *points);
         let [tx, ty, tz] = self.translation;
         [x + tx, y + ty, z + tz]
-    }
-
-    /// Transforms sixteen directions of a's frame to b's.
-    #[inline(always)]
-    #[must_use]
-    pub fn directions_back<S: Simd>(&self, [x, y, z]: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
-        let [rx, ry, rz] = self.rotation;
-        [
-            *x * rx[0] + *y * ry[0] + *z * rz[0],
-            *x * rx[1] + *y * ry[1] + *z * rz[1],
-            *x * rx[2] + *y * ry[2] + *z * rz[2],
-        ]
     }
 
     /// Transforms sixteen directions of b's frame to a's.

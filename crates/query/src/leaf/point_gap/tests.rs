@@ -119,7 +119,7 @@ fn gaps_are_below_the_distances_of_all_places() {
                 [
                     a.gap_to_others(simd, &b, f32::INFINITY),
                     a.gap_to_others(simd, &b, 0.1),
-                    a.gap_to_box(simd, &bounds),
+                    a.balls.gap_to_box(simd, &bounds),
                     of_balls,
                 ]
             })
