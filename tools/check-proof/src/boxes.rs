@@ -122,8 +122,8 @@ pub(crate) fn distance(a: &Placed, b: &Placed, wanted: f64) -> Option<f64> {
     proven.or_else(|| distance_along(a, b, between_nearest(a, b), wanted))
 }
 
-/// Returns the approximate distance of two sets of parts and boxes, if they are proven to be at least `wanted`
-/// apart.
+/// Returns the approximate distance of two sets of parts and boxes, if they are proven to be at least
+/// `wanted` apart.
 pub(crate) fn distance_of_all(a: &[Placed], b: &[Placed], wanted: f64) -> Option<f64> {
     let mut least = f64::INFINITY;
     for (p, q) in a.iter().flat_map(|p| b.iter().map(move |q| (p, q))) {

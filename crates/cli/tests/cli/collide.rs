@@ -271,7 +271,7 @@ fn a_file_of_poses_is_answered_in_order() {
     assert!(last.starts_with("line 2501: "), "one line is blank: {last}");
     let words = "2500 poses: 834 touch (first on line 1, at (0.7";
     assert!(summary.starts_with(words), "{summary}");
-    assert!(summary.contains("), 1666 apart. Smallest clearance of those apart: between 0.3"), "{summary}");
+    assert!(summary.contains("), 1666 apart. Smallest clearance of those apart: between 0.4"), "{summary}");
 }
 
 #[test]
@@ -435,10 +435,10 @@ fn separations_are_certified_and_their_proof_is_written() {
     let estimated = ask(&place, &["--pose-b", &apart, "--evidence", "estimated"]);
     assert_eq!((&estimated["evidence"], &estimated["gap"]), (&"estimated".into(), &Value::Null));
     let told = place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &apart]).results;
-    assert!(told.contains("No contact; between 0.8") && told.contains("(certified)"), "{told}");
+    assert!(told.contains("No contact; between 0.9") && told.contains("(certified)"), "{told}");
     let told =
         place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &apart, "--evidence", "estimated"]).results;
-    assert!(told.contains("No contact found; between 0.8") && told.contains("(estimated)"), "{told}");
+    assert!(told.contains("No contact found; between 0.9") && told.contains("(estimated)"), "{told}");
 }
 
 #[test]

@@ -58,8 +58,8 @@ pub struct ScanArrays<'a> {
     pub dense: usize,
 }
 
-/// What contains the obstacle near each point of a block: a ball about the point and, on a sheet, a slab about
-/// its tangent plane.
+/// Volumes that contain the obstacle near each point of a block: a ball about the point and, on a sheet, a slab
+/// about its tangent plane.
 #[derive(Debug, Clone, Copy)]
 pub struct ObstacleParts {
     /// The normals of the points; zero in unused lanes.
@@ -185,7 +185,7 @@ impl ScanArrays<'_> {
         reaches
     }
 
-    /// Returns what contains the obstacle near each of the points in a block.
+    /// Returns the volumes that contain the obstacle near each of the points in a block.
     ///
     /// # Panics
     /// If there is no such block.

@@ -17,7 +17,7 @@ use nearmiss_lanes::wide::{Vectors, along, bits, blocks_of, lanes_of, load, prod
 use crate::pair::pairing::Pairing;
 use crate::pair::scan_pair::ScanPair;
 
-/// What the square of a sine may be too small by: normals are unit up to rounding, and a turned one likewise.
+/// An upper bound on the error of the square of a sine: normals are unit up to rounding, also turned ones.
 const SINE_SQ: f32 = 1e-4;
 
 /// Balls in lanes.
@@ -29,8 +29,8 @@ struct Balls<S: Simd> {
     lanes: u32,
 }
 
-/// The cut balls about the points of a leaf that contain its part of the obstacle, in lanes, in one of the two
-/// stored frames.
+/// The cut balls about the points of a leaf that contain its part of the obstacle, in lanes, in one of the
+/// two stored frames.
 #[derive(Clone, Copy)]
 struct CutBalls<S: Simd> {
     balls: Balls<S>,
@@ -49,14 +49,14 @@ impl<S: Simd> Balls<S> {
         Self { centres: load(simd, &scan.blocks[block].position), radii, lanes: lanes_of(block, leaf) }
     }
 
-    /// Those of a, moved into b's frame.
+    /// Moves balls of a into b's frame.
     #[inline(always)]
     fn moved_back(self, relative: &Relative) -> Self {
         let centres = relative.points_back(&self.centres);
         Self { centres, radii: self.radii * relative.scale_back(), ..self }
     }
 
-    /// Those of b, moved into a's frame.
+    /// Moves balls of b into a's frame.
     #[inline(always)]
     fn moved(self, relative: &Relative) -> Self {
         let centres = relative.points(&self.centres);
@@ -104,7 +104,7 @@ impl<S: Simd> CutBalls<S> {
         Self { balls, normals: load(simd, &normals), slabs, faces }
     }
 
-    /// Those of b, moved into a's frame.
+    /// Moves cut balls of b into a's frame.
     #[inline(always)]
     fn moved(self, relative: &Relative) -> Self {
         let (normals, scale) = (relative.directions(&self.normals), relative.scale());
@@ -158,7 +158,7 @@ fn stored<S: Simd>([x, y, z]: &Vectors<S>) -> [[f32; 16]; 3] {
     [x.to_array(), y.to_array(), z.to_array()]
 }
 
-/// How far cut balls, with these radii, slabs and faces, extend from their centres in a direction, given the
+/// The extents of cut balls, with these radii, slabs and faces, from their centres in a direction, given the
 /// absolute cosine of the direction and their normals.
 ///
 /// The furthest place is that of the ball if the slab holds it, and on the rim of a face otherwise.

@@ -18,8 +18,8 @@ const WIDTH: usize = PointBlock::WIDTH;
 const EXACT: u64 = 2;
 
 impl MeshScanPairing<'_> {
-    /// A lower bound on the distance of two leaves: of each triangle from the enclosure of the points and, for
-    /// obstacles, from the parts of the points.
+    /// A lower bound on the distance of two leaves: of each triangle from the enclosure of the points and,
+    /// for obstacles, from the parts of the points.
     pub(crate) fn gap_of_two_leaves(&self, pair: NodePair) -> f32 {
         let leaf = self.b.tree.topology().leaf_number(pair.b);
         let (triangles, lanes) = (self.triangles(leaf), self.lanes(leaf).0);

@@ -17,7 +17,7 @@ const ROUNDING: f64 = 8e-6;
 /// Coordinates beyond this have squares near the end of single precision.
 const FARTHEST: f64 = 1e15;
 
-/// What the square of a sine may be too small by, as normals in steps are not of unit length.
+/// An upper bound on the error of the square of a sine, as normals in steps are not of unit length.
 const SINE_SQ: f32 = 5e-4;
 
 /// The box about the core of a shape, in single precision.
