@@ -58,8 +58,8 @@ pub struct ScanArrays<'a> {
     pub dense: usize,
 }
 
-/// Volumes that contain the obstacle near each point of a block: a ball about the point and, on a sheet, a slab
-/// about its tangent plane.
+/// Volumes that contain the obstacle near each point of a block: a ball about the point and, on a sheet, a
+/// slab about its tangent plane.
 #[derive(Debug, Clone, Copy)]
 pub struct ObstacleParts {
     /// The normals of the points; zero in unused lanes.
