@@ -20,6 +20,9 @@ use crate::pair::scan_pair::ScanPair;
 /// An upper bound on the error of the square of a sine: normals are unit up to rounding, also turned ones.
 const SINE_SQ: f32 = 1e-4;
 
+/// The part of a height that is left if its normal is not longer than a unit vector, up to rounding.
+const HEIGHT: f32 = 1.0 - 1e-5;
+
 /// Balls in lanes.
 #[derive(Clone, Copy)]
 struct Balls<S: Simd> {
@@ -144,8 +147,8 @@ impl<S: Simd> CutBalls<S> {
             let (of_own, of_other) = (product(d, self.normals).abs(), along(d, normal).abs());
             let by_way = away - extent(of_own * per_length, own) - extent(of_other * per_length, other);
             let cosine = along(self.normals, normal).abs();
-            let by_own = of_own - self.slabs - extent(cosine, other);
-            let by_other = of_other - slabs[lane] - extent(cosine, own);
+            let by_own = of_own * HEIGHT - self.slabs - extent(cosine, other);
+            let by_other = of_other * HEIGHT - slabs[lane] - extent(cosine, own);
             let own = self.balls.least(simd, by_way.max(by_own).max(by_other));
             least = if own >= least { least } else { own };
         }
