@@ -1,10 +1,9 @@
 //! Lower bounds on the distance of obstacles, from the points of a leaf.
 //!
-//! The part of a point in the obstacle is in a ball about the point and, if it is on a sheet, in a
-//! slab about its tangent plane ([`ObstacleParts`]). So a leaf's
-//! part of the obstacle is in the union of these cut balls. They give a much better bound than the box of
-//! the leaf if that is mostly empty, as at a silhouette in a depth frame or between strays, and a better one
-//! wherever two sheets face each other.
+//! The part of a point in the obstacle is in a ball about the point and, if it is on a sheet, in a slab
+//! about its tangent plane ([`ObstacleParts`]). So a leaf's part of the obstacle is in the union of these
+//! cut balls. They give a much better bound than the box of the leaf if that is mostly empty, as at a
+//! silhouette in a depth frame or between strays, and a better one wherever two sheets face each other.
 
 use std::ops::Range;
 
