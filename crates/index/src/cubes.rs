@@ -93,6 +93,25 @@ impl Cubes {
         Some((cube, within))
     }
 
+    /// Returns the part of a cube that contains a place, if each edge is cut into `parts`: the number of parts
+    /// from the first along each axis, and the distances of the place from the first corner of its part, in
+    /// edges of a part. `None` outside the grid and for NaN.
+    #[inline(always)]
+    #[must_use]
+    pub fn locate_part(&self, place: [f64; 3], parts: u32) -> Option<([u32; 3], [f64; 3])> {
+        let (mut numbers, mut within) = ([0; 3], [0.0; 3]);
+        for k in 0..3 {
+            let at = self.along(k, place[k]) * f64::from(parts);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+            let number = at as u32;
+            if at.is_nan() || at < 0.0 || number as usize >= self.size[k] * parts as usize {
+                return None;
+            }
+            (numbers[k], within[k]) = (number, at - f64::from(number));
+        }
+        Some((numbers, within))
+    }
+
     /// Returns the number of the cube that is this many cubes from the first along each axis.
     #[inline]
     #[must_use]
@@ -131,12 +150,19 @@ mod tests {
             for cube in 0..cubes.count() {
                 let centre = cubes.centre(cube);
                 assert_eq!(cubes.at(centre), Some(cube), "{cubes:?}");
+                let (part, within) = cubes.locate_part(centre.map(|c| c + 0.4 * cubes.edge()), 5).unwrap();
+                assert_eq!(cubes.number(part.map(|own| own as usize / 5)), cube);
+                assert!(part.iter().all(|own| own % 5 == 4), "0.9 edges from the corner, {part:?}");
+                assert!(within.iter().all(|c| (c - 0.5).abs() < 1e-9), "{within:?}");
             }
             for far in [[-1.0; 3], max.map(|c| c - 1.0)] {
                 for side in [-0.49, 0.49] {
                     let place = far.map(|c| c + side * cubes.edge());
                     assert!(cubes.at(place).is_some(), "{place:?} in {cubes:?}");
                 }
+            }
+            for none in [[f64::NAN, 0.0, 0.0], [0.0, -9.0, 0.0], [0.0, 0.0, 1e300]] {
+                assert_eq!(cubes.locate_part(none, 12), None);
             }
             assert_eq!(cubes.at([f64::NAN, 0.0, 0.0]), None);
             assert_eq!(cubes.at([0.0, -9.0, 0.0]), None, "before the grid");

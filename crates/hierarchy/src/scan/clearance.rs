@@ -2,6 +2,7 @@
 //! small shape touches a scan are answered by one of its places, or by the point that is named there.
 
 mod brick;
+mod direction;
 mod page;
 #[cfg(test)]
 mod tests;
@@ -21,8 +22,8 @@ use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
 use crate::descent::PlaceVisitor;
 use crate::scan::arrays::ScanArrays;
-use crate::scan::clearance::brick::Neighbours;
-use crate::scan::clearance::page::{Entry, Near, Page, Reach, in_part};
+use crate::scan::clearance::brick::Brick;
+use crate::scan::clearance::page::{Entry, Near, Page, Reach};
 use crate::tree::wide::Tree;
 
 /// The edge of a cube, in sampling radii, if the block of cubes has its least edge.
@@ -39,7 +40,11 @@ const MOST_OF_CUBE: f64 = 1.5;
 const NEAR: f64 = 1.466;
 
 /// The greatest distance in a brick, in edges.
-const MOST_IN_BRICK: f64 = 1.0;
+const MOST_IN_BRICK: f64 = 1.25;
+
+/// The step to another place whose distances tell most about a place, in edges: somewhat more than half the
+/// distance of the places of a brick, beyond which the greatest distance in a brick is soon reached.
+const BEYOND: f64 = 0.4;
 
 /// The distance from the centre of a cube up to which its brick lists leaves, in edges.
 const LISTED: f64 = 1.35;
@@ -49,6 +54,12 @@ const BLOCKS_A_POINT: f64 = 1.0;
 
 /// The maximum number of comparisons of a leaf and a block, for each point.
 const COMPARED: f64 = 64.0;
+
+/// The number of places along each edge of a cube, and of a block.
+#[expect(clippy::cast_possible_truncation, reason = "3 and 12")]
+const IN_CUBE: u32 = brick::SIDE as u32;
+#[expect(clippy::cast_possible_truncation, reason = "3 and 12")]
+const IN_BLOCK: u32 = IN_CUBE * page::SIDE as u32;
 
 /// Steps of a stored distance.
 const STEPS: f64 = 255.0;
@@ -98,17 +109,15 @@ pub struct Clearance<'a> {
     pub discs: f64,
     /// The distance from the volumes that contain the obstacle.
     pub obstacle: f64,
-    /// The distance from the enclosures of all leaves that are not listed.
-    listed: f64,
-    /// The neighbours of the cube, and the number of the place in it.
-    place: Option<(&'a Neighbours, usize)>,
+    /// The cube, the number of the place in it that is looked up, and the vector from there.
+    place: Option<(&'a Brick, usize, [f64; 3])>,
 }
 
 impl Clearance<'_> {
     /// The same distance from everything.
     #[inline(always)]
     const fn coarse(bound: f64) -> Self {
-        Self { discs: bound, obstacle: bound, listed: bound, place: None }
+        Self { discs: bound, obstacle: bound, place: None }
     }
 
     /// Returns the leaf, and the number in it, of the point whose disc, without its thickness, or ball is
@@ -116,8 +125,19 @@ impl Clearance<'_> {
     #[inline]
     #[must_use]
     pub fn nearest(&self) -> Option<(usize, usize)> {
-        let (neighbours, place) = self.place?;
-        neighbours.nearest(place)
+        let (brick, place, _) = self.place?;
+        brick.nearest(place)
+    }
+
+    /// Returns the direction, to within a few degrees, to the place from the disc or ball that is nearest, and
+    /// an estimate of the distance from that. `None` as for [`Self::nearest`].
+    #[inline(always)]
+    #[must_use]
+    pub fn direction(&self) -> Option<([f64; 3], f64)> {
+        let (brick, place, away) = self.place?;
+        let direction = brick.direction(place)?.map(f64::from);
+        let along: f64 = (0..3).map(|k| direction[k] * away[k]).sum();
+        Some((direction, self.discs + length(away) + along))
     }
 }
 
@@ -214,36 +234,60 @@ impl ClearanceGrid {
     #[inline]
     #[must_use]
     pub fn at(&self, scan: &ScanArrays<'_>, place: [f64; 3], reach: f64) -> Clearance<'_> {
-        let [of_block, of_cube, of_place, of_list] = self.steps;
-        let Some((block, within)) = self.blocks.locate(place) else {
+        self.beside(scan, place, [0.0; 3], reach)
+    }
+
+    /// Returns the same about a place that is `away` from the `other` one, by what the grid knows at the
+    /// other one.
+    ///
+    /// The grid knows distances at some places. Between two of these a distance is least certain if the
+    /// nearest part is behind one of them. From beyond the place, seen from that part, more is certain.
+    #[inline(always)]
+    #[must_use]
+    pub fn beside(
+        &self,
+        scan: &ScanArrays<'_>,
+        other: [f64; 3],
+        away: [f64; 3],
+        reach: f64,
+    ) -> Clearance<'_> {
+        let [of_block, of_cube, of_place, _] = self.steps;
+        let Some((part, within)) = self.blocks.locate_part(other, IN_BLOCK) else {
             // The grid continues this far beyond the obstacle.
-            let is_place = place.iter().all(|c| c.is_finite());
+            let is_place = other.iter().all(|c| c.is_finite());
             return Clearance::coarse(if is_place {
-                STEPS * of_block * (1.0 - 1e-9)
+                STEPS * of_block * (1.0 - 1e-9) - length(away)
             } else {
                 f64::NEG_INFINITY
             });
         };
-        let (edge, entry) = (self.blocks.edge(), self.entries[block]);
+        let place_edge = self.blocks.edge() / f64::from(IN_BLOCK);
+        // The distance from the centre of the block or the cube, which has as many places along each axis.
+        let off = |places: u32| {
+            length([0, 1, 2].map(|k| {
+                (f64::from(part[k] % places) + within[k] - 0.5 * f64::from(places)) * place_edge + away[k]
+            }))
+        };
+        let entry = self.entries[self.blocks.number(part.map(|own| (own / IN_BLOCK) as usize))];
         if entry & COARSE != 0 {
-            return Clearance::coarse(f64::from(entry & !COARSE) * of_block - edge * off(within));
+            return Clearance::coarse(f64::from(entry & !COARSE) * of_block - off(IN_BLOCK));
         }
         if reach > of_cube * page::STEPS {
             return Clearance::coarse(0.0);
         }
-        let (cube, within) = in_part::<{ page::SIDE }>(within);
-        let edge = edge / page::SIDE as f64;
         let number = entry as usize;
         let page = self.pages[number].0.get().unwrap_or_else(|| self.first_page(scan, number));
-        let (distances, neighbours) = match page.at(cube) {
-            Entry::Steps(steps) => return Clearance::coarse(f64::from(steps) * of_cube - edge * off(within)),
-            Entry::Brick(distances, neighbours) => (distances, neighbours),
+        let [x, y, z] = part.map(|own| (own / IN_CUBE) as usize % page::SIDE);
+        let brick = match page.at((x * page::SIDE + y) * page::SIDE + z) {
+            Entry::Steps(steps) => return Clearance::coarse(f64::from(steps) * of_cube - off(IN_CUBE)),
+            Entry::Brick(brick) => brick,
         };
-        let listed = f64::from(distances.listed) * of_list - edge * off(within);
-        let (number, within) = in_part::<{ brick::SIDE }>(within);
-        let off = edge / brick::SIDE as f64 * off(within);
-        let [discs, obstacle] = distances.at(number).map(|steps| f64::from(steps) * of_place - off);
-        Clearance { discs, obstacle, listed, place: Some((neighbours, number)) }
+        let [x, y, z] = part.map(|own| (own % IN_CUBE) as usize);
+        let number = (x * brick::SIDE + y) * brick::SIDE + z;
+        let away = [0, 1, 2].map(|k| (within[k] - 0.5) * place_edge + away[k]);
+        let off = length(away);
+        let [discs, obstacle] = brick.distances(number).map(|steps| f64::from(steps) * of_place - off);
+        Clearance { discs, obstacle, place: Some((brick, number, away)) }
     }
 
     /// Returns the number of a leaf that is about as near to a place as any other; `None` outside the grid.
@@ -265,17 +309,23 @@ impl ClearanceGrid {
         most: f64,
         visitor: &mut V,
     ) -> Option<ControlFlow<()>> {
-        if most.is_nan() || most > clearance.listed {
+        let (brick, number, away) = clearance.place?;
+        let (side, place_edge) = (brick::SIDE, self.edge() / brick::SIDE as f64);
+        let numbers = [number / (side * side), number / side % side, number % side];
+        #[expect(clippy::cast_precision_loss, reason = "small")]
+        let from_middle = numbers.map(|own| own as f64 + 0.5 - 0.5 * side as f64);
+        let from_centre = [0, 1, 2].map(|k| from_middle[k] * place_edge + away[k]);
+        let listed = f64::from(brick.listed) * self.steps[3] - length(from_centre);
+        if most.is_nan() || most > listed {
             return None;
         }
-        let (neighbours, _) = clearance.place?;
         #[expect(clippy::cast_possible_truncation, reason = "counted in `lost`")]
         let (place, most) = (place.map(|c| c as f32), ((most + self.lost) as f32).next_up());
         let most_sq = (most * most).next_up();
         Some(dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || {
-                for &leaf in neighbours.leaves() {
+                for &leaf in brick.leaves() {
                     let bounds = &self.leaves[leaf as usize];
                     if distance_sq(bounds, sub(place, bounds.centre)) <= most_sq {
                         visitor.leaf(simd, leaf as usize)?;
@@ -286,6 +336,14 @@ impl ClearanceGrid {
         )))
     }
 
+    /// Returns how far from a place, seen from what is nearest, [`Self::beside`] tells most about whether
+    /// something is `within` a distance of the place. Not positive if it tells nothing.
+    #[inline(always)]
+    #[must_use]
+    pub fn step_beyond(&self, within: f64) -> f64 {
+        (BEYOND * self.edge()).min(STEPS * self.steps[2] - within)
+    }
+
     /// Returns the edge of a cube.
     #[must_use]
     pub fn edge(&self) -> f64 {
@@ -293,10 +351,10 @@ impl ClearanceGrid {
     }
 }
 
-/// The distance of a place from the centre of its cube, in edges, rounded up.
+/// The length of a vector, rounded up.
 #[inline(always)]
-fn off(within: [f64; 3]) -> f64 {
-    within.map(|c| (c - 0.5) * (c - 0.5)).iter().sum::<f64>().sqrt() * (1.0 + 1e-9)
+fn length([x, y, z]: [f64; 3]) -> f64 {
+    (x * x + y * y + z * z).sqrt() * (1.0 + 1e-9)
 }
 
 /// Gives each block without a leaf that of a block beside it, breadth first.

@@ -152,9 +152,24 @@ pub(crate) struct Distances<S: Simd> {
 }
 
 impl<S: Simd> Distances<S> {
-    /// The distances of balls where `radii` are those of balls, and of discs where `are_discs`.
+    /// The distances of balls and, where `are_discs`, of all within `thick` of discs.
     #[inline(always)]
-    pub(crate) fn from(
+    pub(crate) fn from_parts(
+        &self,
+        simd: S,
+        radii: f32x16<S>,
+        thick: f32x16<S>,
+        are_discs: mask32x16<S>,
+    ) -> f32x16<S> {
+        let of_balls = self.from_point - radii;
+        let out = (self.beside - radii).max(f32x16::splat(simd, 0.0));
+        let of_discs = of_balls.max((self.from_plane * self.from_plane + out * out).sqrt());
+        are_discs.select(of_discs.max(self.across(radii)) - thick, of_balls)
+    }
+
+    /// The distances of balls and, where `are_discs`, of their parts within `thick` of a plane.
+    #[inline(always)]
+    pub(crate) fn from_cells(
         &self,
         simd: S,
         radii: f32x16<S>,
@@ -165,8 +180,13 @@ impl<S: Simd> Distances<S> {
         let of_balls = self.from_point - radii;
         let (up, out) = ((self.from_plane - thick).max(zero), (self.beside - radii).max(zero));
         let of_discs = of_balls.max((up * up + out * out).sqrt());
-        // The core is beyond the plane across the way to the point, and a disc reaches this far towards it.
-        let of_discs = of_discs.max(self.from_point - radii * self.sine - thick);
-        are_discs.select(of_discs, of_balls)
+        are_discs.select(of_discs.max(self.across(radii) - thick), of_balls)
+    }
+
+    /// The distances of discs: the core is beyond the plane across the way to the point, and a disc reaches
+    /// this far towards it.
+    #[inline(always)]
+    fn across(&self, radii: f32x16<S>) -> f32x16<S> {
+        self.from_point - radii * self.sine
     }
 }

@@ -8,11 +8,11 @@ use nearmiss_hierarchy::{Clearance, ClearanceGrid};
 use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
 
-/// The maximum number of places at which the grid is probed.
-const MOST_PROBES: usize = 9;
+/// The maximum number of parts of a core.
+const MOST_PARTS: usize = 11;
 
-/// The distance of places, in edges of the grid's cubes: that of the places of a cube.
-const APART: f64 = 1.0 / 3.0;
+/// The maximum number of parts if only a touch is left to find.
+const MOST_TO_TOUCH: usize = 5;
 
 /// The answer of the grid about a shape.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,8 @@ pub(crate) fn is_far(elements: &Elements<'_>, solid: &Solid<'_>) -> bool {
     told.is_some_and(|at| at.discs > within)
 }
 
-/// Probes the grid at the centre of a shape and, if that does not decide, along the longest axis of its core.
+/// Probes the grid at the centre of a shape and, where that does not decide, at the centres of parts of its
+/// core.
 ///
 /// `proven` selects the volumes that contain the obstacle instead of the discs and balls. Calls `each` with
 /// the points that are named where the shape may touch.
@@ -46,42 +47,113 @@ pub(crate) fn probe<'a>(
 ) -> Probed<'a> {
     let Some(grid) = elements.clear else { return Probed::Open(None) };
     let within = elements.margin + solid.radius;
-    let bound = |at: &Clearance<'_>| if proven { at.obstacle } else { at.discs };
+    let probes = Probes { elements, grid, within, proven };
     let mut named = |at: &Clearance<'_>, inner: f64| match at.nearest() {
         Some((leaf, number)) if at.discs <= within + inner => {
             each(elements.arrays.leaves.points(leaf).start + number)
         }
         _ => ControlFlow::Continue(()),
     };
-    let at = |place: Vector3<f64>| grid.at(&elements.arrays, place.into(), within);
-    let centre = at(solid.centre);
-    if bound(&centre) > within + solid.half.norm() {
+    let centre = probes.at(solid.centre);
+    if probes.bound(&centre) > within + solid.half.norm() {
         return Probed::Clear;
     }
-    let axis = solid.half.imax();
-    let [length, a, b] = [0, 1, 2].map(|j| solid.half[(axis + j) % 3]);
-    // Balls of this radius about places of the axis are in the core, if it is a segment or a box.
-    let inner = a.min(b);
-    if named(&centre, inner).is_break() {
-        return Probed::Ended;
-    }
-    let across = (a * a + b * b).sqrt();
-    let apart = (APART * grid.edge()).max(0.5 * across);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    let count = ((length / apart).ceil() as usize).clamp(1, MOST_PROBES) | 1;
-    #[expect(clippy::cast_precision_loss, reason = "a small number")]
-    let half = length / count as f64;
-    // Balls of this radius about the places contain the core.
-    let cover = within + (half * half + across * across).sqrt() * (1.0 + 1e-9);
-    let mut is_clear = bound(&centre) > cover;
-    for i in 1..count {
-        #[expect(clippy::cast_precision_loss, reason = "a small number")]
-        let steps = i.div_ceil(2) as f64 * if i % 2 == 0 { 2.0 * half } else { -2.0 * half };
-        let at = at(solid.centre + solid.axes[axis] * steps);
-        is_clear &= bound(&at) > cover;
-        if named(&at, inner).is_break() {
+    let mut waiting = [Part { place: solid.centre, half: solid.half }; MOST_PARTS];
+    let (mut left, mut count, mut is_clear) = (1, 1, true);
+    while left > 0 {
+        left -= 1;
+        let part = waiting[left];
+        let at = if count == 1 { centre } else { probes.at(part.place) };
+        let cover = within + part.half.norm() * (1.0 + 1e-9);
+        let mut bound = probes.bound(&at);
+        if bound > cover {
+            continue;
+        }
+        // A ball of this radius about the place is in the core, if that is a point, a segment or a box.
+        let inner = part.half.min();
+        let direction = at.direction();
+        let may_touch = direction.is_none_or(|(_, distance)| distance <= within + inner);
+        if may_touch && named(&at, inner).is_break() {
             return Probed::Ended;
+        }
+        if is_clear {
+            bound = bound.max(probes.beyond(part.place, &at));
+            if bound > cover {
+                continue;
+            }
+        }
+        is_clear &= bound > within;
+        let most = if is_clear { MOST_PARTS } else { MOST_TO_TOUCH };
+        match part.halves(
+            solid,
+            (bound - within).max(0.0),
+            direction.map_or(Vector3::zeros(), |own| own.0.into()),
+        ) {
+            None => {}
+            Some(_) if count + 2 > most => is_clear = false,
+            Some(halves) => {
+                waiting[left..left + 2].copy_from_slice(&halves);
+                (left, count) = (left + 2, count + 2);
+            }
         }
     }
     if is_clear { Probed::Clear } else { Probed::Open(Some((grid, centre))) }
+}
+
+/// A part of a core, or a box about it.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    place: Vector3<f64>,
+    half: Vector3<f64>,
+}
+
+impl Part {
+    /// The halves along the longest axis, less what is in a ball of radius `clear` about the centre. The one
+    /// that is nearer to the surface, from which the `direction` points, comes last. `None` for a point.
+    #[inline(always)]
+    fn halves(&self, solid: &Solid<'_>, clear: f64, direction: Vector3<f64>) -> Option<[Self; 2]> {
+        let axis = self.half.imax();
+        let [length, a, b] = [0, 1, 2].map(|j| self.half[(axis + j) % 3]);
+        if length == 0.0 {
+            return None;
+        }
+        // The ball contains the part up to here along the axis.
+        let done = (clear * clear - a * a - b * b).max(0.0).sqrt() * (1.0 - 1e-9);
+        let (off, mut half) = (solid.axes[axis] * (0.5 * (length + done)), self.half);
+        half[axis] = 0.5 * (length - done) * (1.0 + 1e-9);
+        let off = if off.dot(&direction) < 0.0 { -off } else { off };
+        Some([off, -off].map(|off| Self { place: self.place + off, half }))
+    }
+}
+
+/// Probes of a grid about a shape.
+struct Probes<'s, 'a> {
+    elements: &'s Elements<'a>,
+    grid: &'a ClearanceGrid,
+    /// The distance from the core up to which the scan is of interest.
+    within: f64,
+    proven: bool,
+}
+
+impl<'a> Probes<'_, 'a> {
+    #[inline(always)]
+    fn at(&self, place: Vector3<f64>) -> Clearance<'a> {
+        self.grid.at(&self.elements.arrays, place.into(), self.within)
+    }
+
+    #[inline(always)]
+    fn bound(&self, at: &Clearance<'_>) -> f64 {
+        if self.proven { at.obstacle } else { at.discs }
+    }
+
+    /// The bound about a place by what the grid knows beyond it, seen from the nearest point.
+    #[inline(always)]
+    fn beyond(&self, place: Vector3<f64>, at: &Clearance<'_>) -> f64 {
+        let length = self.grid.step_beyond(self.within);
+        let Some((step, _)) = at.direction().filter(|_| length > 0.0) else { return self.bound(at) };
+        let step = Vector3::from(step) * length;
+        let reach = self.within + length;
+        let other = self.grid.beside(&self.elements.arrays, (place + step).into(), (-step).into(), reach);
+        self.bound(&other)
+    }
 }

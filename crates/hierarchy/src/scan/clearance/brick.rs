@@ -8,6 +8,7 @@ use crate::bounds::boxes::OrientedBox;
 use crate::point::kind::{SLAB, THICKNESS};
 use crate::point::leaf_block::WIDTH;
 use crate::scan::arrays::ScanArrays;
+use crate::scan::clearance::direction::Direction;
 
 /// The number of places along each edge of a cube.
 pub(crate) const SIDE: usize = 3;
@@ -27,37 +28,39 @@ const NO_LEAF: u32 = u32::MAX;
 /// The code of a place for which no point is named.
 const NO_POINT: u8 = u8::MAX;
 
-/// The distances of the places of a cube, in steps. Half a line of the cache.
+/// The places of a cube, and the leaves near it. Two lines of the cache, the first of which decides most
+/// questions.
 #[derive(Debug, Clone, Copy)]
-#[repr(C, align(32))]
-pub(crate) struct Distances {
-    /// From discs and balls.
+#[repr(C, align(128))]
+pub(crate) struct Brick {
+    /// The distances of the places from discs and balls, in steps.
     discs: [u8; PLACES],
-    /// The maximum by which the obstacle is nearer.
+    /// The directions of the places from what is nearest.
+    directions: [Direction; PLACES],
+    /// The maximum by which the obstacle is nearer, in steps.
     nearer: u8,
-    /// All leaves that are not listed are at least this far from the centre of the cube.
+    /// All leaves that are not listed are at least this far from the centre of the cube, in steps.
     pub(crate) listed: u8,
-}
-
-impl Distances {
-    /// Returns the distances of a place in steps, from discs and balls and from the obstacle.
-    #[inline(always)]
-    pub(crate) fn at(&self, place: usize) -> [i32; 2] {
-        let discs = i32::from(self.discs[place]);
-        [discs, discs - i32::from(self.nearer)]
-    }
-}
-
-/// The leaves near a cube, and the points that are nearest to its places. A line of the cache.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub(crate) struct Neighbours {
     leaves: [u32; MOST_LEAVES],
-    /// The place of a leaf in the list, times 16, and the number of a point in the leaf.
+    /// The points that are nearest to the places: the place of a leaf in the list, times 16, and the number
+    /// in the leaf.
     nearest: [u8; PLACES],
 }
 
-impl Neighbours {
+impl Brick {
+    /// Returns the distances of a place in steps, from discs and balls and from the obstacle.
+    #[inline(always)]
+    pub(crate) fn distances(&self, place: usize) -> [i32; 2] {
+        let discs = i32::from(self.discs[place]);
+        [discs, discs - i32::from(self.nearer)]
+    }
+
+    /// Returns the direction of a place from the disc or ball that is nearest.
+    #[inline(always)]
+    pub(crate) fn direction(&self, place: usize) -> Option<[f32; 3]> {
+        self.directions[place].vector()
+    }
+
     /// Returns the leaf and the number in it of the point whose disc or ball is nearest to the centre of a
     /// place.
     #[inline(always)]
@@ -99,6 +102,19 @@ impl Item {
         let radius = scan.discs.get(i);
         let (thick, slab) = (THICKNESS * radius, SLAB * scan.radii[i]);
         Self { position, normal, is_disc: true, radius, reach, thick, slab }
+    }
+
+    /// The vector to a place from the nearest point of the disc, or from the centre of the ball.
+    fn away(&self, place: [f32; 3]) -> [f32; 3] {
+        let away = sub(place, self.position);
+        if !self.is_disc {
+            return away;
+        }
+        let height = dot(away, self.normal);
+        let beside = [0, 1, 2].map(|k| away[k] - height * self.normal[k]);
+        let length = dot(beside, beside).sqrt();
+        let beyond = if length > self.radius { 1.0 - self.radius / length } else { 0.0 };
+        [0, 1, 2].map(|k| height * self.normal[k] + beyond * beside[k])
     }
 }
 
@@ -189,8 +205,9 @@ impl Places {
                 #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "below 256")]
                 let code = code as i32;
                 self.compare_item(simd, item, code);
-                (self.thick, self.slab) = (self.thick.max(item.thick), self.slab.max(item.slab));
             }
+            // Also of a disc that is left out: with its thickness it may be nearer than the furthest one.
+            (self.thick, self.slab) = (self.thick.max(item.thick), self.slab.max(item.slab));
         }
         // No iterator over functions: it may be compiled without the instruction set of the caller.
         let mut furthest = f32x16::load_array_ref(simd, &self.discs[0]);
@@ -235,28 +252,41 @@ impl Places {
         }
     }
 
-    /// The brick of the cube, with the first of these leaves. All others are as far from its centre as
-    /// `listed` tells first, at most the second distance.
-    pub(crate) fn brick(
+    /// The brick of the cube, with the first of these leaves, each with the parts of its points. All others
+    /// are as far from its centre as `listed` tells first, at most the second distance.
+    pub(crate) fn brick<'i>(
         &self,
-        leaves: impl Iterator<Item = u32>,
+        leaves: impl Iterator<Item = (u32, &'i [Item])>,
         listed: (f32, f32),
-    ) -> (Distances, Neighbours) {
+    ) -> Brick {
         let steps = |distance: f32, most: f32| in_steps(distance, (most, 255.0), self.lost);
-        let mut distances = Distances { discs: [0; PLACES], nearer: 0, listed: steps(listed.0, listed.1) };
-        let mut neighbours = Neighbours { leaves: [NO_LEAF; MOST_LEAVES], nearest: [NO_POINT; PLACES] };
-        for (slot, leaf) in neighbours.leaves.iter_mut().zip(leaves) {
-            *slot = leaf;
+        let mut brick = Brick {
+            discs: [0; PLACES],
+            directions: [Direction::NONE; PLACES],
+            nearer: 0,
+            listed: steps(listed.0, listed.1),
+            leaves: [NO_LEAF; MOST_LEAVES],
+            nearest: [NO_POINT; PLACES],
+        };
+        let mut items: [&[Item]; MOST_LEAVES] = [&[]; MOST_LEAVES];
+        for ((slot, items), (leaf, own)) in brick.leaves.iter_mut().zip(&mut items).zip(leaves) {
+            (*slot, *items) = (leaf, own);
         }
         for place in 0..PLACES {
             let (vector, lane) = (place / WIDTH, place % WIDTH);
             let [discs, obstacle] = [(&self.discs, self.thick), (&self.obstacle, self.slab)]
                 .map(|(squares, thick)| steps(squares[vector][lane].sqrt() - thick, self.most));
-            distances.discs[place] = discs;
-            distances.nearer = distances.nearer.max(discs.saturating_sub(obstacle));
-            neighbours.nearest[place] = u8::try_from(self.nearest[vector][lane]).unwrap_or(NO_POINT);
+            brick.discs[place] = discs;
+            brick.nearer = brick.nearer.max(discs.saturating_sub(obstacle));
+            let Ok(code) = u8::try_from(self.nearest[vector][lane]) else { continue };
+            brick.nearest[place] = code;
+            let (slot, number) = (usize::from(code) / WIDTH, usize::from(code) % WIDTH);
+            if let Some(item) = items.get(slot).and_then(|items| items.get(number)) {
+                let [x, y, z] = &self.places[vector];
+                brick.directions[place] = Direction::of(item.away([x[lane], y[lane], z[lane]]));
+            }
         }
-        (distances, neighbours)
+        brick
     }
 }
 

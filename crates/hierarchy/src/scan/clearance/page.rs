@@ -12,9 +12,7 @@ use crate::bounds::part::Part;
 use crate::descent::PlaceVisitor;
 use crate::point::leaf_block::WIDTH;
 use crate::scan::arrays::ScanArrays;
-use crate::scan::clearance::brick::{
-    Distances, Item, MOST_LEAVES, Neighbours, Places, distances_sq, in_steps,
-};
+use crate::scan::clearance::brick::{Brick, Item, MOST_LEAVES, Places, distances_sq, in_steps};
 use crate::tree::wide::{Siblings, Tree};
 
 /// The number of cubes along each edge of a page.
@@ -39,15 +37,13 @@ pub(crate) const STEPS: f64 = 191.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
     codes: [u8; CUBES],
-    /// The distances and the neighbours of the bricks.
-    distances: Vec<Distances>,
-    neighbours: Vec<Neighbours>,
+    bricks: Vec<Brick>,
 }
 
 /// The entry of a cube in a page.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Entry<'a> {
-    Brick(&'a Distances, &'a Neighbours),
+    Brick(&'a Brick),
     /// The clearance in steps.
     Steps(u8),
 }
@@ -57,30 +53,11 @@ impl Page {
     pub(crate) fn at(&self, cube: usize) -> Entry<'_> {
         let code = self.codes[cube];
         if code < BRICKS {
-            let brick = usize::from(code);
-            Entry::Brick(&self.distances[brick], &self.neighbours[brick])
+            Entry::Brick(&self.bricks[usize::from(code)])
         } else {
             Entry::Steps(code - BRICKS)
         }
     }
-}
-
-/// The part of a cube that contains a place, if it is cut into `SIDE` along each edge, and the place within
-/// the part, in edges of the part.
-#[inline(always)]
-pub(crate) fn in_part<const SIDE: usize>(within: [f64; 3]) -> (usize, [f64; 3]) {
-    let (mut part, mut place) = (0, [0.0; 3]);
-    for k in 0..3 {
-        #[expect(clippy::cast_precision_loss, reason = "small")]
-        let at = within[k] * SIDE as f64;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
-        let own = (at as usize).min(SIDE - 1);
-        part = part * SIDE + own;
-        #[expect(clippy::cast_precision_loss, reason = "a small number")]
-        let steps = own as f64;
-        place[k] = at - steps;
-    }
-    (part, place)
 }
 
 /// Distances of interest, in single precision.
@@ -134,7 +111,7 @@ impl Near {
         self.leaves.clear();
         let mut search = Collect { tree: &scan.tree, most_sq: within * within, found: &mut self.leaves };
         if scan.tree.descend_to_by(simd, middle, &mut search).is_break() {
-            return Page { codes: [BRICKS; CUBES], distances: Vec::new(), neighbours: Vec::new() };
+            return Page { codes: [BRICKS; CUBES], bricks: Vec::new() };
         }
         let mut centres = [[[0.0; WIDTH]; 3]; VECTORS];
         for cube in 0..CUBES {
@@ -164,21 +141,14 @@ impl Near {
         }
         let near = |clearance: f32| clearance < reach.near;
         let count = least.as_flattened().iter().filter(|&&clearance| near(clearance)).count();
-        let mut page = Page {
-            codes: [0; CUBES],
-            distances: Vec::with_capacity(count),
-            neighbours: Vec::with_capacity(count),
-        };
+        let mut page = Page { codes: [0; CUBES], bricks: Vec::with_capacity(count) };
         for (cube, code) in page.codes.iter_mut().enumerate() {
             let clearance = least[cube / WIDTH][cube % WIDTH];
             if near(clearance) {
                 #[expect(clippy::cast_possible_truncation, reason = "below 64")]
-                let number = page.distances.len() as u8;
+                let number = page.bricks.len() as u8;
                 *code = number;
-                let (distances, neighbours) =
-                    self.brick(simd, reach, (cube, centre(corner, reach.edge, cube)));
-                page.distances.push(distances);
-                page.neighbours.push(neighbours);
+                page.bricks.push(self.brick(simd, reach, (cube, centre(corner, reach.edge, cube))));
             } else {
                 *code = BRICKS + in_steps(clearance, (reach.most, STEPS as f32), reach.lost);
             }
@@ -188,12 +158,7 @@ impl Near {
 
     /// The brick of a cube with this centre.
     #[inline(always)]
-    fn brick<S: Simd>(
-        &mut self,
-        simd: S,
-        reach: &Reach,
-        (cube, centre): (usize, [f64; 3]),
-    ) -> (Distances, Neighbours) {
+    fn brick<S: Simd>(&mut self, simd: S, reach: &Reach, (cube, centre): (usize, [f64; 3])) -> Brick {
         let mut places = Places::new(centre, reach.edge, (reach.in_brick, reach.lost));
         let most = places.within().max(reach.listed);
         self.own.clear();
@@ -210,12 +175,19 @@ impl Near {
             }
             let near = near as usize;
             if places.may_be_near(simd, &self.bounds[near]) {
-                places.compare(simd, &self.items[self.ends[near]..self.ends[near + 1]], slot);
+                places.compare(simd, self.items_of(near), slot);
             }
         }
         let listed = self.own.get(MOST_LEAVES).map_or(reach.listed, |own| own.0.min(reach.listed));
-        let leaves = self.own.iter().map(|own| self.leaves[own.1 as usize]);
+        let leaves = self.own.iter().map(|own| own.1 as usize);
+        let leaves = leaves.map(|near| (self.leaves[near], self.items_of(near)));
         places.brick(leaves, (listed, reach.listed))
+    }
+
+    /// The parts of the points of a leaf.
+    #[inline(always)]
+    fn items_of(&self, near: usize) -> &[Item] {
+        &self.items[self.ends[near]..self.ends[near + 1]]
     }
 }
 

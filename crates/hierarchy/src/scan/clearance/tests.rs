@@ -57,6 +57,11 @@ struct Seen {
     free: u32,
     lost: f64,
     lost_obstacle: f64,
+    /// The same by way of places beyond, and how often.
+    beyond: u32,
+    lost_beyond: f64,
+    /// The error of estimated distances.
+    off: f64,
     named: u32,
     listed: u32,
     unlisted: u32,
@@ -78,6 +83,7 @@ impl Seen {
             self.lost += (nearest[0] - at.discs) / grid.edge();
             self.lost_obstacle += (nearest[1] - at.obstacle) / grid.edge();
         }
+        self.check_beyond(scan, grid, (place.into(), &at), nearest);
         if let Some((leaf, number)) = at.nearest() {
             self.named += 1;
             let own = distances(scan, scan.leaves.points(leaf).start + number, place)[0];
@@ -106,6 +112,38 @@ impl Seen {
     }
 }
 
+impl Seen {
+    /// Checks what the grid tells about a place, whose distances are known, by way of others.
+    fn check_beyond(
+        &mut self,
+        scan: &ScanArrays<'_>,
+        grid: &ClearanceGrid,
+        (place, at): (Vector, &Clearance<'_>),
+        exact: [f64; 2],
+    ) {
+        let within = 0.25 * grid.edge();
+        let direction = at.direction();
+        let steps = [
+            Vector::x() * grid.edge(),
+            Vector::new(-0.7, 0.3, 0.2) * grid.edge(),
+            direction.map_or(Vector::zeros(), |(own, _)| Vector::from(own) * grid.step_beyond(within)),
+        ];
+        let told = steps.map(|step| {
+            let other = grid.beside(scan, (place + step).into(), (-step).into(), 0.0);
+            for (told, exact) in [other.discs, other.obstacle].into_iter().zip(exact) {
+                assert!(told <= exact + 1e-12, "{place:?} has {told} by {step:?}, not {exact}");
+            }
+            other.discs
+        });
+        let Some((_, estimate)) = direction.filter(|_| 0.05 < exact[0] && exact[0] < grid.edge()) else {
+            return;
+        };
+        self.beyond += 1;
+        self.lost_beyond += (exact[0] - told[2].max(at.discs)) / grid.edge();
+        self.off += (estimate - exact[0]).abs() / grid.edge();
+    }
+}
+
 #[test]
 fn the_grid_tells_bounds_and_what_is_near() {
     let rng = &mut rng(9401);
@@ -130,9 +168,11 @@ fn the_grid_tells_bounds_and_what_is_near() {
         }
     }
     println!("{seen:?}");
-    let Seen { grids, free, lost, lost_obstacle, named, listed, unlisted } = seen;
+    let Seen { grids, free, lost, lost_obstacle, beyond, lost_beyond, off, named, listed, unlisted } = seen;
     assert!(grids >= 8 && free > 1000 && named > 3000, "{seen:?}");
     assert!(lost.max(lost_obstacle) < 0.35 * f64::from(free), "{seen:?}");
+    let beyond = f64::from(beyond);
+    assert!(beyond > 1000.0 && lost_beyond < 0.1 * beyond && off < 0.05 * beyond, "{seen:?}");
     assert!(listed > 2000 && unlisted > 0, "{seen:?}");
 }
 
