@@ -93,9 +93,9 @@ impl Cubes {
         Some((cube, within))
     }
 
-    /// Returns the part of a cube that contains a place, if each edge is cut into `parts`: the number of parts
-    /// from the first along each axis, and the distances of the place from the first corner of its part, in
-    /// edges of a part. `None` outside the grid and for NaN.
+    /// Returns the part of a cube that contains a place, if each edge is cut into `parts`: the number of
+    /// parts from the first along each axis, and the distances of the place from the first corner of its
+    /// part, in edges of a part. `None` outside the grid and for NaN.
     #[inline(always)]
     #[must_use]
     pub fn locate_part(&self, place: [f64; 3], parts: u32) -> Option<([u32; 3], [f64; 3])> {

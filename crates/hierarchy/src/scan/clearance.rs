@@ -129,8 +129,8 @@ impl Clearance<'_> {
         brick.nearest(place)
     }
 
-    /// Returns the direction, to within a few degrees, to the place from the disc or ball that is nearest, and
-    /// an estimate of the distance from that. `None` as for [`Self::nearest`].
+    /// Returns the direction, to within a few degrees, to the place from the disc or ball that is nearest,
+    /// and an estimate of the distance from that. `None` as for [`Self::nearest`].
     #[inline(always)]
     #[must_use]
     pub fn direction(&self) -> Option<([f64; 3], f64)> {

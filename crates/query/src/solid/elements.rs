@@ -329,9 +329,9 @@ impl<'a> Elements<'a> {
         let used = mask32x16::from_bitmask(simd, (1_u64 << count) - 1);
         let none = f32x16::splat(simd, f32::INFINITY);
         let Measured { distances, tilt, off } = Measured::new(simd, lane_box, block);
-        let elements = distances.from_parts(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
+        let elements = distances.parts(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
         let cells = if has_cells {
-            distances.from_cells(simd, parts.reaches, parts.slabs, parts.discs) - tilt
+            distances.cells(simd, parts.reaches, parts.slabs, parts.discs) - tilt
         } else {
             elements
         };

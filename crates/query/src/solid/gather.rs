@@ -65,7 +65,7 @@ impl Gather<'_, '_> {
         let Near { elements, solid, lane_box, most, .. } = self.near;
         let parts = elements.parts(simd, leaf, part, false);
         let Measured { distances, tilt, .. } = Measured::new(simd, &lane_box, block);
-        let gaps = distances.from_parts(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
+        let gaps = distances.parts(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
         let lanes = Elements::within(simd, (&gaps.to_array(), count), most);
         if lanes == 0 {
             return;

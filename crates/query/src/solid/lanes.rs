@@ -152,9 +152,9 @@ pub(crate) struct Distances<S: Simd> {
 }
 
 impl<S: Simd> Distances<S> {
-    /// The distances of balls and, where `are_discs`, of all within `thick` of discs.
+    /// The distances from balls and, where `are_discs`, from all within `thick` of discs.
     #[inline(always)]
-    pub(crate) fn from_parts(
+    pub(crate) fn parts(
         &self,
         simd: S,
         radii: f32x16<S>,
@@ -167,9 +167,9 @@ impl<S: Simd> Distances<S> {
         are_discs.select(of_discs.max(self.across(radii)) - thick, of_balls)
     }
 
-    /// The distances of balls and, where `are_discs`, of their parts within `thick` of a plane.
+    /// The distances from balls and, where `are_discs`, from their parts within `thick` of a plane.
     #[inline(always)]
-    pub(crate) fn from_cells(
+    pub(crate) fn cells(
         &self,
         simd: S,
         radii: f32x16<S>,

@@ -10,6 +10,7 @@ mod curves_hard;
 mod cut;
 mod distance;
 mod graphed;
+mod grazing;
 mod interpolation;
 mod interpolation_leaves;
 mod manifold;

@@ -1,8 +1,8 @@
 //! Directions in eight bits.
 
-/// A direction, five degrees off in the mean and at most 15: the number of a cell on the sides of an octahedron, unfolded to a
-/// square of 16 × 16 cells (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit
-/// Vectors").
+/// A direction, five degrees off in the mean and at most 15: the number of a cell on the sides of an
+/// octahedron, unfolded to a square of 16 × 16 cells (Cigolle et al. 2014, "A Survey of Efficient
+/// Representations for Independent Unit Vectors").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(transparent)]
 pub(super) struct Direction(u8);
@@ -57,6 +57,7 @@ mod tests {
     fn directions_are_kept_to_within_a_few_degrees() {
         let rng = &mut rng(9404);
         let corners = (0..27).map(|i| [i % 3, i / 3 % 3, i / 9].map(|c: u8| f32::from(c) - 1.0));
+        #[expect(clippy::cast_possible_truncation, reason = "near one")]
         let random = (0..20_000).map(|_| unit_vector(rng).map(|c| c as f32));
         let (mut greatest, mut sum, mut count) = (0.0_f32, 0.0, 0.0);
         for vector in corners.chain(random).filter(|v| *v != [0.0; 3]) {
