@@ -15,7 +15,7 @@ use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
 ///
 /// The surroundings of a part of the surface are computed when a shape first comes there, in about 0.1 ms
 /// for a block of eight sampling radii (10 ms where points are much denser than elsewhere). They are kept:
-/// another 40 to 60 bytes a point once shapes have been everywhere. [`Self::complete`] computes all of them
+/// another 55 to 80 bytes a point once shapes have been everywhere. [`Self::complete`] computes all of them
 /// beforehand.
 ///
 /// Against points, an index pays off from some hundred shapes on. Against the surface of 100,000 points it
