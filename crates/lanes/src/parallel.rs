@@ -2,6 +2,8 @@
 //! pool. Results come in order, so they are the same for any number of threads.
 
 use std::ops::Range;
+#[cfg(feature = "rayon")]
+use std::sync::{Mutex, PoisonError};
 
 /// The number of items of at most a microsecond that a thread takes at once, enough to hide the
 /// cost of scheduling.
@@ -39,9 +41,9 @@ pub fn map_each<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> 
     map_with(count, || (), |(), i| f(i))
 }
 
-/// Maps each number below `count`, with scratch memory. `scratch` is called a few times for each
-/// thread; its contents must not affect the results.
-pub fn map_with<S, R: Send>(
+/// Maps each number below `count`, with scratch memory. `scratch` is called about once for each thread; its
+/// contents must not affect the results.
+pub fn map_with<S: Send, R: Send>(
     count: usize,
     scratch: impl Fn() -> S + Sync + Send,
     f: impl Fn(&mut S, usize) -> R + Sync + Send,
@@ -49,8 +51,10 @@ pub fn map_with<S, R: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        let most = count.div_ceil(PIECES);
-        (0..count).into_par_iter().with_max_len(most).map_init(scratch, f).collect()
+        let (most, pool) = (count.div_ceil(PIECES), Mutex::new(Vec::new()));
+        let lend = || Lent { scratch: taken(&pool), pool: &pool };
+        let f = |lent: &mut Lent<'_, S>, i| f(lent.scratch.get_or_insert_with(&scratch), i);
+        (0..count).into_par_iter().with_max_len(most).map_init(lend, f).collect()
     }
     #[cfg(not(feature = "rayon"))]
     {
@@ -59,14 +63,35 @@ pub fn map_with<S, R: Send>(
     }
 }
 
+/// Scratch memory that returns to a pool after use.
+#[cfg(feature = "rayon")]
+struct Lent<'a, S> {
+    scratch: Option<S>,
+    pool: &'a Mutex<Vec<S>>,
+}
+
+#[cfg(feature = "rayon")]
+impl<S> Drop for Lent<'_, S> {
+    fn drop(&mut self) {
+        let mut pool = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        pool.extend(self.scratch.take());
+    }
+}
+
+/// Takes scratch memory from a pool, if there is some.
+#[cfg(feature = "rayon")]
+fn taken<S>(pool: &Mutex<Vec<S>>) -> Option<S> {
+    pool.lock().unwrap_or_else(PoisonError::into_inner).pop()
+}
+
 /// Maps consecutive ranges of 1024 numbers that partition `0..count`.
 pub fn ranges<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Send) -> Vec<R> {
     ranges_with(count, AT_ONCE, || (), |(), range| f(range))
 }
 
 /// Like [`ranges`], with ranges of `length` numbers (the last may be shorter) and scratch memory.
-/// `scratch` is called a few times for each thread; its contents must not affect the results.
-pub fn ranges_with<S, R: Send>(
+/// `scratch` is called about once for each thread; its contents must not affect the results.
+pub fn ranges_with<S: Send, R: Send>(
     count: usize,
     length: usize,
     scratch: impl Fn() -> S + Sync + Send,
@@ -82,7 +107,7 @@ const WAVE: usize = 1 << 9;
 /// Maps consecutive ranges that partition `0..count`, for expensive `f`, with scratch memory as
 /// [`map_with`] has it. `take` receives the results in order, while later ones are computed. At most 1024
 /// results are held at once.
-pub fn in_order<S, R: Send>(
+pub fn in_order<S: Send, R: Send>(
     count: usize,
     scratch: impl Fn() -> S + Sync + Send,
     f: impl Fn(&mut S, Range<usize>) -> R + Sync + Send,
@@ -104,7 +129,7 @@ pub fn in_order<S, R: Send>(
 ///
 /// # Panics
 /// If `f` returns more items in all than `out` has.
-pub fn collect_into<S, T: Copy + Send>(
+pub fn collect_into<S: Send, T: Copy + Send>(
     out: &mut [T],
     count: usize,
     scratch: impl Fn() -> S + Sync + Send,
@@ -302,6 +327,44 @@ pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     work()
 }
 
+/// Runs `work` as [`in_pool`] does, and keeps another thread of the pool awake meanwhile.
+///
+/// A thread without work falls asleep after some ten microseconds, and takes as long to wake. This is for
+/// work of a few milliseconds that alternates between short loops and short steps on one thread. The other
+/// thread is busy until the end, even where only one has something to do.
+pub fn in_pool_awake<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    #[cfg(feature = "rayon")]
+    return in_pool(|| {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        /// Ends the waiting, also if the work panics.
+        struct End<'a>(&'a AtomicBool);
+        impl Drop for End<'_> {
+            fn drop(&mut self) {
+                self.0.store(true, Ordering::Release);
+            }
+        }
+        let (here, is_over) = (rayon::current_thread_index(), AtomicBool::new(false));
+        let end = End(&is_over);
+        let work = || {
+            let _end = end;
+            work()
+        };
+        // The thread of the work takes this up where one of its loops waits for another thread, and must
+        // return to the work then.
+        let wait = || {
+            let is_elsewhere = rayon::current_thread_index() != here;
+            while is_elsewhere && !is_over.load(Ordering::Acquire) {
+                if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                    std::thread::yield_now();
+                }
+            }
+        };
+        rayon::join(work, wait).0
+    });
+    #[cfg(not(feature = "rayon"))]
+    work()
+}
+
 /// The error of [`on_threads`] if the threads cannot be started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoThreads;
@@ -328,6 +391,35 @@ mod tests {
         collect_into(&mut out, 50, || (), |(), range| range.flat_map(|i| [2 * i, 2 * i + 1]).collect());
         assert_eq!(out, (0..100).collect::<Vec<_>>());
         in_order(0, || (), |(), _| (), |()| unreachable!("there is nothing to do"));
+    }
+
+    #[test]
+    #[cfg(feature = "rayon")]
+    fn work_with_another_thread_awake_ends() {
+        for threads in [1, 2, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            // Loops within loops, so that the thread of the work waits for others and takes up what it finds.
+            let sum = || map_each(64, |i| map(5000, |k| i * k % 7).into_iter().sum::<usize>());
+            for _ in 0..50 {
+                assert_eq!(pool.install(|| in_pool_awake(sum)), sum());
+            }
+            let fails = || pool.install(|| in_pool_awake(|| panic!("as intended")));
+            let failed = std::panic::catch_unwind::<_, ()>(std::panic::AssertUnwindSafe(fails));
+            assert!(failed.is_err());
+        }
+        assert_eq!(in_pool_awake(|| 3), 3, "from outside of a pool");
+    }
+
+    #[test]
+    #[cfg(feature = "rayon")]
+    fn scratch_memory_is_used_again() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        let made = AtomicUsize::new(0);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let scratch = || made.fetch_add(1, Ordering::Relaxed);
+        let found = pool.install(|| map_with(1000, scratch, |_, i| i));
+        assert_eq!(found, (0..1000).collect::<Vec<_>>());
+        assert!(made.into_inner() <= 2, "one for each thread");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::vector::{cross, dot, sub, tangents};
 use nearmiss_lanes::wide::{WIDTH, along, load, seen_from, spread_out, squared, sum, sum_of_each};
 
+use crate::tree::axes::Spread;
 use crate::tree::topology::MOST_LEAF_POINTS;
 
 /// The ridge of the fit as a share of the second moments. It draws directions in which the points do
@@ -119,7 +120,8 @@ impl Rest {
 
     /// Fits the motion from `points`, at rest, to the places `now`. For a leaf that is carried along, the
     /// spacing changes by at most the factor `most` or its reciprocal, and so does the ratio of a length to
-    /// the spacing. Each point is within `off` of its radius of its place.
+    /// the spacing. Each point is within `off` of its radius of its place. Also returns the moments of these
+    /// places.
     #[inline(always)]
     pub(crate) fn motion<S: Simd>(
         &self,
@@ -127,7 +129,7 @@ impl Rest {
         points: &[RestLanes],
         now: &[[f32; 3]],
         (most, off): (f32, f32),
-    ) -> Motion {
+    ) -> (Motion, Spread) {
         let (first, mut places) = (now[0], [[[0.0; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH]);
         let mut sums = [f32x16::splat(simd, 0.0); 3];
         for (now, places) in now.chunks(WIDTH).zip(&mut places) {
@@ -145,17 +147,24 @@ impl Rest {
             first[1] + sum(sums[1]) / count,
             first[2] + sum(sums[2]) / count,
         ];
-        // Rows of Σ (q − q̄)(p − p̄)ᵀ.
+        // Rows of Σ (q − q̄)(p − p̄)ᵀ, and six entries of Σ (q − q̄)(q − q̄)ᵀ.
         let mut products = [f32x16::splat(simd, 0.0); WIDTH];
         for (points, places) in points.iter().zip(&places) {
-            let (p, q) = (load(simd, &points.positions), seen_from(simd, places, middle));
+            let (p, mut q) = (load(simd, &points.positions), seen_from(simd, places, middle));
+            let is_used: mask32x16<S> =
+                f32x16::load_array_ref(simd, &points.radii).simd_lt(f32x16::splat(simd, f32::INFINITY));
             for i in 0..3 {
+                q[i] = simd.select_f32x16(is_used, q[i], f32x16::splat(simd, 0.0));
                 for k in 0..3 {
                     products[3 * i + k] += q[i] * p[k];
                 }
             }
+            let [x, y, z] = q;
+            for (k, product) in [x * x, x * y, x * z, y * y, y * z, z * z].into_iter().enumerate() {
+                products[9 + k] += product;
+            }
         }
-        let [xx, xy, xz, yx, yy, yz, zx, zy, zz, ..] = sum_of_each(products);
+        let [xx, xy, xz, yx, yy, yz, zx, zy, zz, second @ .., _] = sum_of_each(products);
         let rows = [[xx + self.ridge, xy, xz], [yx, yy + self.ridge, yz], [zx, zy, zz + self.ridge]];
         let [a, b, c, d, e, f] = self.inverse;
         let mut linear = rows;
@@ -187,11 +196,12 @@ impl Rest {
         }
         let column = |k: usize| [linear[0][k], linear[1][k], linear[2][k]];
         let [x, y, z] = [column(0), column(1), column(2)];
-        Motion {
+        let motion = Motion {
             cofactors: [cross(y, z), cross(z, x), cross(x, y)],
             spacing: if (spacing - 1.0).abs() < RIGID { 1.0 } else { spacing },
             is_carried,
-        }
+        };
+        (motion, Spread::about(count, middle, second))
     }
 }
 
@@ -272,11 +282,34 @@ mod tests {
         let (rest, mut lanes) = (Rest::new(&points, &normals), [RestLanes::default()]);
         rest.spread((&points, &normals, &[1.4; 16]), &mut lanes);
         let now: Vec<[f32; 3]> = points.iter().map(|p| f(*p)).collect();
-        dispatch!(Level::new(), simd => rest.motion(simd, &lanes, &now, (1.25, 0.2)))
+        dispatch!(Level::new(), simd => rest.motion(simd, &lanes, &now, (1.25, 0.2))).0
     }
 
     fn is_near(a: [f32; 3], b: [f32; 3]) -> bool {
         (0..3).all(|k| (a[k] - b[k]).abs() < 5e-3)
+    }
+
+    #[test]
+    fn the_moments_of_the_places_are_those_of_the_points() {
+        for count in [1_u8, 15, 16, 17, 40] {
+            let points: Vec<[f32; 3]> = (0..count)
+                .map(|i| [f32::from(i % 4) + 100.0, f32::from(i / 4), 0.1 * f32::from(i)])
+                .collect();
+            let (rest, mut lanes) =
+                (Rest::new(&points, &vec![[0.0, 0.0, 1.0]; points.len()]), [RestLanes::default(); 3]);
+            rest.spread((&points, &points, &vec![1.0; points.len()]), &mut lanes);
+            let lanes = &lanes[..points.len().div_ceil(WIDTH)];
+            let now: Vec<[f32; 3]> = points.iter().map(|[x, y, z]| [x + 3.0, y - z, 2.0 * z]).collect();
+            let (_, found) = dispatch!(Level::new(), simd => rest.motion(simd, lanes, &now, (1.25, 0.2)));
+            let expected = Spread::of(&now);
+            let scale = 1.0 + expected.second.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let is_near = |a: &[f64], b: &[f64], off: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= off);
+            assert!(is_near(&found.mean, &expected.mean, 2e-5), "{count}: {found:?}, {expected:?}");
+            assert!(
+                is_near(&found.second, &expected.second, 1e-5 * scale),
+                "{count}: {found:?}, {expected:?}"
+            );
+        }
     }
 
     #[test]

@@ -52,6 +52,7 @@ pub(crate) fn fitted_anew(
     let positions = OnceLock::from(Array::from(positions));
     let mut scan = PointHierarchy { meta, plan, topology, arrays, positions };
     resize(&mut scan, topology);
+    closing.spread(&scan);
     closing.support(&mut scan);
     find_gaps(&mut scan, &fits);
     closing.bound(&mut scan);

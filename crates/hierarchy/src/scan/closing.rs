@@ -6,7 +6,7 @@ use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::{both, change_each, fill, runs};
 use nearmiss_lanes::wide::greatest_of;
 use nearmiss_store::Array;
-use nearmiss_surface::{EigenBlock, SurfacePlan};
+use nearmiss_surface::SurfacePlan;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
@@ -19,7 +19,7 @@ use crate::point::neighbours::groups_in_motion;
 use crate::scan::build::PointHierarchy;
 use crate::scan::identity::identity;
 use crate::scan::sampling::Selection;
-use crate::tree::axes::{Spread, principal_axes};
+use crate::tree::axes::{Spread, principal_axes, spread_leaves};
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Root, growths_of_siblings, reaches, siblings};
 
@@ -31,23 +31,31 @@ pub(crate) struct Closing {
     boxes: Vec<OrientedBox>,
     growths: Vec<[Growth; 2]>,
     spreads: Vec<Spread>,
-    solved: Vec<EigenBlock>,
     selection: Selection,
 }
 
 impl Closing {
+    /// Returns the moments of the leaves, to be set.
+    pub(crate) fn spreads_of_leaves(&mut self, topology: &Topology) -> &mut [Spread] {
+        self.spreads.resize(topology.len(), Spread::default());
+        &mut self.spreads[topology.inner()..]
+    }
+
+    /// Computes the moments of the leaves from the points.
+    pub(crate) fn spread(&mut self, scan: &PointHierarchy) {
+        let leaves = self.spreads_of_leaves(&scan.topology);
+        spread_leaves(scan.positions(), &scan.topology, leaves);
+    }
+
     /// Sets the sampling radius, the support radii of the points, the balls around blocks, and the axes
-    /// of boxes. There are no neighbour lists afterwards.
+    /// of boxes, from the moments of leaves. There are no neighbour lists afterwards.
     pub(crate) fn support(&mut self, scan: &mut PointHierarchy) {
-        // Unpacks the positions of a scan from a file.
-        let _unpacked = scan.positions();
-        let PointHierarchy { meta, plan, topology, arrays, positions } = scan;
-        let positions: &[[f32; 3]] = positions.get().map_or(&[], |positions| positions);
-        let Self { boxes, spreads, solved, selection, .. } = self;
+        let PointHierarchy { meta, plan, topology, arrays, .. } = scan;
+        let Self { boxes, spreads, selection, .. } = self;
         boxes.resize(topology.len(), OrientedBox::default());
         // Each has a part on one thread, which the other fills.
         both(
-            || principal_axes(positions, topology, boxes, (spreads, solved)),
+            || principal_axes(topology, boxes, spreads),
             || {
                 meta.sampling_radius = selection.of(&arrays.radii);
                 let (radius, unit) = (f64::from(meta.sampling_radius), 1.0 / meta.frame.scale);

@@ -119,6 +119,7 @@ fn bounds_and_sum(positions: &[[f64; 3]]) -> (Aabb, f64) {
 fn bounds_of_few(positions: &[[f64; 3]]) -> (Aabb, f64) {
     // The coordinates of eight points, which fill whole registers.
     const ROW: usize = 24;
+    const PLACES: usize = 8;
     let (mut low, mut high, mut sums) = ([f64::INFINITY; ROW], [f64::NEG_INFINITY; ROW], [0.0; ROW]);
     let (rows, rest) = positions.as_flattened().as_chunks::<ROW>();
     let mut take = |i: usize, x: f64| {
@@ -126,13 +127,19 @@ fn bounds_of_few(positions: &[[f64; 3]]) -> (Aabb, f64) {
         high[i] = if x > high[i] { x } else { high[i] };
         sums[i] += 0.0 * x;
     };
-    for row in rows {
-        for i in 0..ROW {
-            take(i, row[i]);
+    // Several places are read by turns, as a core reads one after the other at a fraction of the speed.
+    let (places, left) = rows.split_at(rows.len() / PLACES * PLACES);
+    let part = places.len() / PLACES;
+    for k in 0..part {
+        for place in 0..PLACES {
+            let row = &places[place * part + k];
+            for i in 0..ROW {
+                take(i, row[i]);
+            }
         }
     }
-    for (i, x) in rest.iter().enumerate() {
-        take(i, *x);
+    for (i, x) in left.as_flattened().iter().chain(rest).enumerate() {
+        take(i % ROW, *x);
     }
     let mut bounds = Aabb::EMPTY;
     for i in 0..ROW {

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 
 use nearmiss_geometry::{Aabb, Frame, PointCloud};
-use nearmiss_lanes::parallel::{fill, in_pool, map_all, on_threads};
+use nearmiss_lanes::parallel::{fill, in_pool_awake, map_all, on_threads};
 use nearmiss_store::Workspace;
 use nearmiss_surface::Metric;
 
@@ -126,7 +126,7 @@ impl DeformingScan {
     /// If the number of points differs from that of the first frame, a coordinate is not finite or
     /// too large, or repeated points are apart. The scan is unchanged then.
     pub fn refit(&mut self, points: &[[f64; 3]]) -> Result<Refitted, DeformError> {
-        in_pool(|| {
+        in_pool_awake(|| {
             let (frame, bounds) = self.check(points)?;
             let placed = NextFrame { points, frame, bounds, step: step(&frame, &bounds) };
             Ok(refit(&mut self.scan, &mut self.memory, &placed))
@@ -140,7 +140,7 @@ impl DeformingScan {
     /// # Errors
     /// As [`Self::refit`], and if the frame cannot be prepared with the options of the first one.
     pub fn renew(&mut self, points: &[[f64; 3]]) -> Result<(), DeformError> {
-        in_pool(|| self.renew_here(points))
+        in_pool_awake(|| self.renew_here(points))
     }
 
     /// Does the same, and starts loops from the current thread.

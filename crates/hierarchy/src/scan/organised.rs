@@ -104,6 +104,7 @@ pub(crate) fn replace_organised(
     meta.dropped = Dropped { not_finite: points.len() - count, duplicate: 0, filtered: 0 };
     meta.is_oriented = false;
     pixels.fill(scan);
+    closing.spread(scan);
     closing.support(scan);
     closing.bound(scan);
     Ok(true)

@@ -11,13 +11,14 @@ use nearmiss_lanes::wide::blocks_of;
 use crate::patch::alignment::align;
 use crate::patch::classes::votes;
 use crate::patch::surfels::{Fit, fits_of, gaps_of};
-use crate::point::affine::{Motion, Rest, RestLanes};
+use crate::point::affine::{Rest, RestLanes};
 use crate::point::disc::PointCode;
 use crate::point::gather::Index;
 use crate::point::neighbours::supports;
 use crate::point::spacing::{Look, spacings_of};
 use crate::scan::build::PointHierarchy;
 use crate::scan::closing::Closing;
+use crate::tree::axes::Spread;
 use crate::tree::topology::Topology;
 
 /// The greatest change of the spacing of a leaf, and of lengths in its tangent plane relative to the
@@ -54,11 +55,12 @@ pub(crate) struct NextFrame<'a> {
     pub(crate) step: f64,
 }
 
-/// A leaf when it was last fitted, and its motion since.
+/// A leaf when it was last fitted.
 #[derive(Debug, Clone, Copy, Default)]
 struct Leaf {
     rest: Rest,
-    motion: Motion,
+    /// `false` if it is to be fitted anew.
+    is_carried: bool,
 }
 
 /// The points as they were when last fitted, and reused memory.
@@ -98,7 +100,7 @@ impl Memory {
 
     /// Returns `true` if a leaf is to be fitted anew.
     fn is_changed(&self, leaf: usize) -> bool {
-        !self.leaves[leaf].motion.is_carried
+        !self.leaves[leaf].is_carried
     }
 }
 
@@ -162,7 +164,7 @@ fn carry(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>)
         runs(arrays.blocks.to_mut(), leaf_size),
         runs(arrays.normals.to_mut(), points),
         runs(arrays.radii.to_mut(), points),
-        runs(&mut memory.leaves, WIDTH),
+        (runs(&mut memory.leaves, WIDTH), runs(memory.closing.spreads_of_leaves(&topology), WIDTH)),
         runs(&mut memory.lanes, WIDTH * lanes_a_leaf(&topology)),
     );
     let level = Level::new();
@@ -174,13 +176,14 @@ fn carry(scan: &mut PointHierarchy, memory: &mut Memory, placed: &NextFrame<'_>)
     });
 }
 
-/// Parts of the positions, blocks, normals, radii and leaves that move, and of the leaves at rest.
+/// Parts of the positions, blocks, normals, radii and leaves that move with the moments of these, and of the
+/// leaves at rest.
 type Moved<'a> = (
     Runs<'a, [f32; 3]>,
     Runs<'a, PointBlock>,
     Runs<'a, [f32; 3]>,
     Runs<'a, f32>,
-    Runs<'a, Leaf>,
+    (Runs<'a, Leaf>, Runs<'a, Spread>),
     Runs<'a, RestLanes>,
 );
 
@@ -199,7 +202,7 @@ impl Moves<'_> {
         &self,
         simd: S,
         start: usize,
-        (positions, blocks, normals, radii, leaves, lanes): Moved<'_>,
+        (positions, blocks, normals, radii, (leaves, spreads), lanes): Moved<'_>,
     ) {
         // A copy, as the loop below may not change it.
         let (leaf_size, points, frame) = (self.leaf_size, self.placed.points, self.placed.frame);
@@ -207,7 +210,7 @@ impl Moves<'_> {
         let of_leaf = |leaf: usize| leaf * leaf_size..all.min((leaf + 1) * leaf_size);
         // The last leaf may fill fewer.
         let lanes_of = |leaf: usize| leaf * each..leaf * each + of_leaf(leaf).len().div_ceil(WIDTH);
-        for (k, leaf) in leaves.elements.iter_mut().enumerate().filter(|(_, leaf)| !leaf.motion.is_carried) {
+        for (k, leaf) in leaves.elements.iter_mut().enumerate().filter(|(_, leaf)| !leaf.is_carried) {
             let own = (&positions.elements[of_leaf(k)], &normals.elements[of_leaf(k)]);
             leaf.rest = Rest::new(own.0, own.1);
             let own = (own.0, own.1, &radii.elements[of_leaf(k)]);
@@ -219,11 +222,13 @@ impl Moves<'_> {
         for (block, points) in blocks.elements.iter_mut().zip(positions.elements.chunks(WIDTH)) {
             block.place(points);
         }
-        for (k, leaf) in leaves.elements.iter_mut().enumerate() {
+        for (k, (leaf, spread)) in leaves.elements.iter_mut().zip(spreads.elements).enumerate() {
             let rest = &lanes.elements[lanes_of(k)];
-            leaf.motion = leaf.rest.motion(simd, rest, &positions.elements[of_leaf(k)], (STRETCH, OFF));
+            let (motion, spread_now) =
+                leaf.rest.motion(simd, rest, &positions.elements[of_leaf(k)], (STRETCH, OFF));
+            (leaf.is_carried, *spread) = (motion.is_carried, spread_now);
             let moved = (&mut normals.elements[of_leaf(k)], &mut radii.elements[of_leaf(k)]);
-            leaf.motion.carry(simd, rest, moved, self.reach);
+            motion.carry(simd, rest, moved, self.reach);
         }
     }
 }

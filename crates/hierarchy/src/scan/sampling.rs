@@ -1,7 +1,10 @@
 //! The sampling density: local radii, the sampling radius, and the points with their support radii.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::parallel::{both, change_each, fill, ranges};
+use nearmiss_lanes::wide::WIDTH;
 use nearmiss_store::{Room, Workspace};
 use nearmiss_surface::SurfacePlan;
 
@@ -41,7 +44,6 @@ impl Sampling {
         unit: f64,
         work: &Workspace,
     ) -> Result<Self, BuildError> {
-        const WIDTH: usize = PointBlock::WIDTH;
         let mut blocks = work.room(positions.len().div_ceil(WIDTH))?;
         let places = |number: usize| number * WIDTH..positions.len().min((number + 1) * WIDTH);
         fill(&mut blocks, |number| PointBlock::of(&positions[places(number)]));
@@ -156,19 +158,42 @@ impl Selection {
 
 /// Appends the radii between `low` and `high` to `between`. Returns the numbers of radii that are less
 /// than `low`, at most `low`, and at most `high`.
-fn ranks(radii: &[f32], [low, high]: [f32; 2], between: &mut Vec<f32>) -> [usize; 3] {
-    const AT_ONCE: usize = 256;
-    let (mut kept, mut counts) = ([0.0; AT_ONCE], [0; 3]);
-    for some in radii.chunks(AT_ONCE) {
-        let mut count = 0;
-        for &radius in some {
-            kept[count % AT_ONCE] = radius;
-            count += usize::from(radius > low) & usize::from(radius < high);
-            counts[0] += usize::from(radius < low);
-            counts[1] += usize::from(radius <= low);
-            counts[2] += usize::from(radius <= high);
+fn ranks(radii: &[f32], bounds: [f32; 2], between: &mut Vec<f32>) -> [usize; 3] {
+    dispatch!(Level::new(), simd => simd.vectorize(
+        #[inline(always)]
+        || ranks_in_lanes(simd, radii, bounds, between),
+    ))
+}
+
+#[inline(always)]
+fn ranks_in_lanes<S: Simd>(
+    simd: S,
+    radii: &[f32],
+    [low, high]: [f32; 2],
+    between: &mut Vec<f32>,
+) -> [usize; 3] {
+    let (lows, highs) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
+    let mut counts = [0; 3];
+    let (rows, rest) = radii.as_chunks::<WIDTH>();
+    for row in rows {
+        let lanes = f32x16::load_array_ref(simd, row);
+        let [below, to_low, to_high, below_high] =
+            [lanes.simd_lt(lows), lanes.simd_le(lows), lanes.simd_le(highs), lanes.simd_lt(highs)]
+                .map(|mask: mask32x16<S>| mask.to_bitmask());
+        for (count, lanes) in counts.iter_mut().zip([below, to_low, to_high]) {
+            *count += lanes.count_ones() as usize;
         }
-        between.extend_from_slice(&kept[..count]);
+        let mut inner = below_high & !to_low;
+        while inner != 0 {
+            between.push(row[inner.trailing_zeros() as usize]);
+            inner &= inner - 1;
+        }
+    }
+    for &radius in rest {
+        counts[0] += usize::from(radius < low);
+        counts[1] += usize::from(radius <= low);
+        counts[2] += usize::from(radius <= high);
+        between.extend((radius > low && radius < high).then_some(radius));
     }
     counts
 }

@@ -1,12 +1,10 @@
 //! The principal axes of all nodes, from the moments of their leaves: in O(n), where summing over
 //! the points of every node takes O(n log n).
 
-use std::ops::Range;
-
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::change_each;
+use nearmiss_lanes::parallel::{change_each, change_runs};
 use nearmiss_lanes::vector::sub;
 use nearmiss_surface::{EigenBlock, MatrixBlock, symmetric_eigen_batch};
 
@@ -17,9 +15,9 @@ use crate::tree::topology::Topology;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Spread {
     count: f64,
-    mean: [f64; 3],
+    pub(crate) mean: [f64; 3],
     /// The sums of the products of coordinates relative to the mean, as xx xy xz yy yz zz.
-    second: [f64; 6],
+    pub(crate) second: [f64; 6],
 }
 
 #[inline(always)]
@@ -28,8 +26,17 @@ fn products([x, y, z]: [f64; 3]) -> [f64; 6] {
 }
 
 impl Spread {
+    /// The moments of `count` points with this mean. `second` holds the sums of the products of their
+    /// coordinates relative to it.
     #[inline(always)]
-    fn of(points: &[[f32; 3]]) -> Self {
+    pub(crate) fn about(count: f32, mean: [f32; 3], second: [f32; 6]) -> Self {
+        let [xx, xy, xz, yy, yz, zz] = second;
+        let second = [xx.into(), xy.into(), xz.into(), yy.into(), yz.into(), zz.into()];
+        Self { count: count.into(), mean: [mean[0].into(), mean[1].into(), mean[2].into()], second }
+    }
+
+    #[inline(always)]
+    pub(crate) fn of(points: &[[f32; 3]]) -> Self {
         let (origin, mut first, mut second) = (points[0], [0.0; 3], [0.0; 6]);
         for p in points {
             let d = sub(*p, origin).map(f64::from);
@@ -63,43 +70,44 @@ impl Spread {
     }
 }
 
-/// Sets the axes of all `boxes` to the principal axes of the points of their nodes, the greatest
-/// variance first. `spreads` and `solved` are reused memory.
-pub(crate) fn principal_axes(
-    positions: &[[f32; 3]],
-    topology: &Topology,
-    boxes: &mut [OrientedBox],
-    (spreads, solved): (&mut Vec<Spread>, &mut Vec<EigenBlock>),
-) {
-    const AT_ONCE: usize = 64;
-    const WIDTH: usize = MatrixBlock::WIDTH;
-    let (count, inner, level) = (topology.len(), topology.inner(), Level::new());
-    spreads.resize(count, Spread::default());
-    solved.resize(count.div_ceil(WIDTH), EigenBlock::default());
-    change_each(&mut spreads[inner..], AT_ONCE, |leaf, spread| {
+/// The number of nodes that a thread takes at once.
+const AT_ONCE: usize = 64;
+
+/// Sets the moments of all leaves.
+pub(crate) fn spread_leaves(positions: &[[f32; 3]], topology: &Topology, leaves: &mut [Spread]) {
+    let level = Level::new();
+    change_each(leaves, AT_ONCE, |leaf, spread| {
         *spread = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || Spread::of(&positions[topology.points_of_leaf(leaf)]),
         ));
     });
+}
+
+/// Sets the axes of all `boxes` to the principal axes of the points of their nodes, the greatest
+/// variance first. Of `spreads`, the moments of all nodes, those of leaves are known.
+pub(crate) fn principal_axes(topology: &Topology, boxes: &mut [OrientedBox], spreads: &mut [Spread]) {
+    const WIDTH: usize = MatrixBlock::WIDTH;
+    let (inner, level) = (topology.inner(), Level::new());
     // Children come after their parent.
     for id in (0..inner).rev() {
         let children = topology.children(NodeId(id32(id))).iter().map(|child| spreads[child.index()]);
         spreads[id] = children.reduce(Spread::with).unwrap_or_default();
     }
     let spreads: &[Spread] = spreads;
-    change_each(solved, AT_ONCE / WIDTH, |number, solved| {
-        let mut block = MatrixBlock::default();
-        let of_block: Range<usize> = number * WIDTH..count.min((number + 1) * WIDTH);
-        for (lane, spread) in spreads[of_block].iter().enumerate() {
-            block.put(lane, spread.second);
+    change_runs(boxes, AT_ONCE, |number, boxes| {
+        let spreads = &spreads[number * AT_ONCE..];
+        for (boxes, spreads) in boxes.chunks_mut(WIDTH).zip(spreads.chunks(WIDTH)) {
+            let (mut block, mut solved) = (MatrixBlock::default(), EigenBlock::default());
+            for (lane, spread) in spreads.iter().enumerate() {
+                block.put(lane, spread.second);
+            }
+            symmetric_eigen_batch(level, &[block], std::slice::from_mut(&mut solved));
+            for (lane, bounds) in boxes.iter_mut().enumerate() {
+                let [_, middle, long] = solved.get(lane).vectors;
+                bounds.axes = to_axes([long, middle]);
+            }
         }
-        symmetric_eigen_batch(level, &[block], std::slice::from_mut(solved));
-    });
-    let solved: &[EigenBlock] = solved;
-    change_each(boxes, AT_ONCE, |id, bounds| {
-        let [_, middle, long] = solved[id / WIDTH].get(id % WIDTH).vectors;
-        bounds.axes = to_axes([long, middle]);
     });
 }
 
@@ -123,7 +131,9 @@ mod tests {
                 let of_points = |id| about(Level::new(), &items[topology.points(id)]);
                 let boxes: Vec<OrientedBox> = topology.ids().map(of_points).collect();
                 let mut found = boxes.clone();
-                principal_axes(&points, &topology, &mut found, (&mut Vec::new(), &mut Vec::new()));
+                let mut spreads = vec![Spread::default(); topology.len()];
+                spread_leaves(&points, &topology, &mut spreads[topology.inner()..]);
+                principal_axes(&topology, &mut found, &mut spreads);
                 for (id, (expected, found)) in boxes.iter().zip(&found).enumerate() {
                     // Axes of equal variance are arbitrary; the variances along them are not.
                     let variance = |axis: [f32; 3]| {

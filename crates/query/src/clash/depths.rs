@@ -43,7 +43,7 @@ enum OfParts {
 }
 
 /// Maps each group on all threads, and passes the share of the groups that are done to `told`.
-fn each<S>(
+fn each<S: Send>(
     groups: &[&ContactGroup],
     told: &mut dyn FnMut(f64),
     scratch: impl Fn() -> S + Sync + Send,
