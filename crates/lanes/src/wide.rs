@@ -24,8 +24,29 @@ pub fn load<S: Simd>(simd: S, [x, y, z]: &[[f32; WIDTH]; 3]) -> Vectors<S> {
 /// Puts vectors side by side, from the first lane on. Other lanes stay, and so do surplus vectors.
 #[inline(always)]
 pub fn spread_out(vectors: &[[f32; 3]], [x, y, z]: &mut [[f32; WIDTH]; 3]) {
+    // A loop of known length is compiled to permutations of registers.
+    if let Some(vectors) = vectors.first_chunk::<WIDTH>() {
+        for i in 0..WIDTH {
+            (x[i], y[i], z[i]) = (vectors[i][0], vectors[i][1], vectors[i][2]);
+        }
+        return;
+    }
     for (((x, y), z), v) in x.iter_mut().zip(y).zip(z).zip(vectors) {
         (*x, *y, *z) = (v[0], v[1], v[2]);
+    }
+}
+
+/// Stores vectors that are side by side one after the other, from the first lane on.
+#[inline(always)]
+pub fn put_together([x, y, z]: &[[f32; WIDTH]; 3], vectors: &mut [[f32; 3]]) {
+    if let Some(vectors) = vectors.first_chunk_mut::<WIDTH>() {
+        for i in 0..WIDTH {
+            vectors[i] = [x[i], y[i], z[i]];
+        }
+        return;
+    }
+    for (((x, y), z), v) in x.iter().zip(y).zip(z).zip(vectors) {
+        *v = [*x, *y, *z];
     }
 }
 
@@ -248,6 +269,24 @@ mod tests {
 
     use super::*;
     use crate::vector;
+
+    #[test]
+    fn vectors_are_spread_out_and_put_together() {
+        for count in 0..=WIDTH + 1 {
+            let vectors: Vec<[f32; 3]> = (0..count).map(|i| [0.0, 0.25, 0.5].map(|k| i as f32 + k)).collect();
+            let mut lanes = [[-1.0; WIDTH]; 3];
+            spread_out(&vectors, &mut lanes);
+            for i in 0..WIDTH {
+                let own = vectors.get(i).copied().unwrap_or([-1.0; 3]);
+                assert_eq!([lanes[0][i], lanes[1][i], lanes[2][i]], own, "{count}, lane {i}");
+            }
+            let mut together = vec![[-2.0; 3]; count];
+            put_together(&lanes, &mut together);
+            let within = count.min(WIDTH);
+            assert_eq!(together[..within], vectors[..within]);
+            assert!(together[within..].iter().all(|v| *v == [-2.0; 3]), "surplus vectors stay");
+        }
+    }
 
     #[test]
     fn cube_roots_are_those_of_the_numbers() {

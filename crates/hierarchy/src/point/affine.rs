@@ -4,7 +4,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::vector::{cross, dot, sub, tangents};
-use nearmiss_lanes::wide::{WIDTH, along, load, seen_from, spread_out, squared, sum, sum_of_each};
+use nearmiss_lanes::wide::{
+    WIDTH, along, load, put_together, seen_from, spread_out, squared, sum, sum_of_each,
+};
 
 use crate::tree::axes::Spread;
 use crate::tree::topology::MOST_LEAF_POINTS;
@@ -244,9 +246,7 @@ impl Motion {
             for k in 0..3 {
                 rows[k] = simd.select_f32x16(is_sound, turned[k] * scale, n[k]).to_array();
             }
-            for (lane, n) in normals.iter_mut().enumerate() {
-                *n = [rows[0][lane], rows[1][lane], rows[2][lane]];
-            }
+            put_together(&rows, normals);
         }
     }
 }
