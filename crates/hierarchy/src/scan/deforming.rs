@@ -220,7 +220,7 @@ impl DeformingScan {
         let Self { scan, options, memory, pixels, .. } = self;
         options.check()?;
         let replaced = on_threads(options.threads, || {
-            replace_organised(scan, pixels, &mut memory.closing, (points, width), options)
+            in_pool_awake(|| replace_organised(scan, pixels, &mut memory.closing, (points, width), options))
         });
         if !replaced.or(Err(BuildError::Threads(options.threads)))?? {
             let hole = |p: &[f64; 3]| if *p == [0.0; 3] { [f64::NAN; 3] } else { *p };
