@@ -177,13 +177,16 @@ fn ranks_in_lanes<S: Simd>(
     let (rows, rest) = radii.as_chunks::<WIDTH>();
     for row in rows {
         let lanes = f32x16::load_array_ref(simd, row);
-        let [below, to_low, to_high, below_high] =
-            [lanes.simd_lt(lows), lanes.simd_le(lows), lanes.simd_le(highs), lanes.simd_lt(highs)]
-                .map(|mask: mask32x16<S>| mask.to_bitmask());
+        // No closure: it may be compiled without the instruction set of the caller.
+        let below: mask32x16<S> = lanes.simd_lt(lows);
+        let to_low: mask32x16<S> = lanes.simd_le(lows);
+        let to_high: mask32x16<S> = lanes.simd_le(highs);
+        let below_high: mask32x16<S> = lanes.simd_lt(highs);
+        let (below, to_low, to_high) = (below.to_bitmask(), to_low.to_bitmask(), to_high.to_bitmask());
         for (count, lanes) in counts.iter_mut().zip([below, to_low, to_high]) {
             *count += lanes.count_ones() as usize;
         }
-        let mut inner = below_high & !to_low;
+        let mut inner = below_high.to_bitmask() & !to_low;
         while inner != 0 {
             between.push(row[inner.trailing_zeros() as usize]);
             inner &= inner - 1;
