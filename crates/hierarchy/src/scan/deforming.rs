@@ -113,7 +113,7 @@ impl DeformingScan {
     }
 
     /// Moves the points, given in the order of the first frame. O(n log n) on all cores; does not
-    /// allocate once warm if no point is fitted anew.
+    /// allocate once warm if no point is fitted anew. A second thread of the pool stays awake until the end.
     ///
     /// The points of a leaf are carried along by the affine map that fits their motion since they were last
     /// fitted: normals turn with it, radii scale with the spacing, classes stay. Where the spacing, or a
