@@ -204,20 +204,6 @@ pub fn greatest<S: Simd>(lanes: f32x16<S>, greatest: f32) -> f32 {
     if own > greatest { own } else { greatest }
 }
 
-/// Returns the maximum of `values` and 0. NaN is ignored.
-#[must_use]
-pub fn greatest_of(values: &[f32]) -> f32 {
-    let (rows, rest) = values.as_chunks::<WIDTH>();
-    let mut most = [0.0_f32; WIDTH];
-    for row in rows {
-        for (most, x) in most.iter_mut().zip(row) {
-            // Unlike `max`, one instruction.
-            *most = if *x > *most { *x } else { *most };
-        }
-    }
-    most.iter().chain(rest).copied().fold(0.0, f32::max)
-}
-
 /// Returns the sum of all lanes, added in halves: the same with any instruction set.
 #[inline(always)]
 #[must_use]
@@ -301,18 +287,6 @@ mod tests {
             }
         }
         assert!((0.0..1e-12).contains(&root(0.0)), "{}", root(0.0));
-    }
-
-    #[test]
-    fn the_greatest_of_a_slice_is_that_of_a_loop() {
-        assert_eq!(greatest_of(&[]), 0.0);
-        let mut values: Vec<f32> = (0..70_u8).map(|i| f32::from(i.wrapping_mul(89))).collect();
-        for end in 0..values.len() {
-            assert_eq!(greatest_of(&values[..end]), values[..end].iter().copied().fold(0.0, f32::max));
-        }
-        values[3] = f32::NAN;
-        values[67] = f32::NAN;
-        assert_eq!(greatest_of(&values), values.iter().copied().fold(0.0, f32::max));
     }
 
     #[test]

@@ -5,6 +5,9 @@
 //! the upper halves of single-precision numbers, rounded up.
 
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, i32x16, mask32x16, u32x16};
+use nearmiss_lanes::wide::WIDTH;
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::boxes::{OrientedBox, ROUNDING};
@@ -62,6 +65,43 @@ impl Growth {
         growth
     }
 
+    /// Returns the results of [`Self::beyond`] for two sets of intervals, each with its lower and upper ends.
+    #[inline(always)]
+    pub(crate) fn beyond_each<S: Simd>(
+        simd: S,
+        own: &[[f32; 2]; 3],
+        intervals: [[[f32; 3]; 2]; 2],
+    ) -> [Self; 2] {
+        /// The first lane of the second growth.
+        const SECOND: usize = WIDTH / 2;
+        let (mut beyond, mut is_empty, mut more) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
+        for (first, [low, high]) in [0, SECOND].into_iter().zip(intervals) {
+            let mut far = 0.0_f32;
+            for k in 0..3 {
+                far = far.max(low[k].abs()).max(high[k].abs());
+                (beyond[first + k], beyond[first + 3 + k]) = (own[k][0] - low[k], high[k] - own[k][1]);
+                (is_empty[first + k], is_empty[first + 3 + k]) = (low[k] - high[k], low[k] - high[k]);
+            }
+            more[first..first + 6].fill(ROUNDING * far);
+        }
+        let (zero, beyond) = (f32x16::splat(simd, 0.0), f32x16::load_array_ref(simd, &beyond));
+        let is_within: mask32x16<S> = beyond.simd_lt(zero);
+        let lengths = is_within.select(zero, beyond) + f32x16::load_array_ref(simd, &more);
+        // Also false for NaN.
+        let is_sound: mask32x16<S> = f32x16::load_array_ref(simd, &is_empty).simd_le(zero)
+            & lengths.simd_le(f32x16::splat(simd, f32::MAX));
+        let lengths = is_sound.select(lengths, f32x16::splat(simd, f32::INFINITY));
+        let bits: u32x16<S> = lengths.bitcast();
+        let halves: i32x16<S> = ((bits + 0xffff) >> 16).bitcast();
+        let (low, high) = halves.split();
+        let halves = low.saturating_narrow(high).to_array().map(i16::cast_unsigned);
+        let growth = |first: usize| Self {
+            low: [halves[first], halves[first + 1], halves[first + 2]],
+            high: [halves[first + 3], halves[first + 4], halves[first + 5]],
+        };
+        [growth(0), growth(SECOND)]
+    }
+
     /// Returns `bounds` grown. Infinite lengths do not move the centre.
     #[inline]
     #[must_use]
@@ -110,7 +150,29 @@ impl Growth {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+    use nearmiss_testdata::arbitrary::rng;
+    use rand::RngExt;
+
     use super::*;
+
+    #[test]
+    fn two_growths_in_lanes_are_those_of_each() {
+        let ends = [f32::NEG_INFINITY, -3.5, -1.0, -0.0, 0.0, 1e-30, 0.7, 1.0, 2.5, 1e38, f32::MAX];
+        let ends: Vec<f32> = ends.into_iter().chain([f32::INFINITY, f32::NAN]).collect();
+        let rng = &mut rng(9);
+        for _ in 0..20_000 {
+            let mut some = || [(); 3].map(|()| ends[rng.random_range(0..ends.len())]);
+            let (own, low, high, other) = (some(), some(), some(), some());
+            let own = own.map(|x| [-x, x]);
+            let expected = [Growth::beyond(&own, low, high), Growth::beyond(&own, high, other)];
+            let found = dispatch!(Level::new(), simd => simd.vectorize(
+                #[inline(always)]
+                || Growth::beyond_each(simd, &own, [[low, high], [high, other]]),
+            ));
+            assert_eq!(found, expected, "{own:?} {low:?} {high:?} {other:?}");
+        }
+    }
 
     #[test]
     fn lengths_are_rounded_up_by_less_than_a_hundredth() {

@@ -41,6 +41,13 @@ pub struct Covering {
     pub spacing: f32,
 }
 
+impl Covering {
+    /// A covering whose radii are not known.
+    pub(crate) const fn withheld(spacing: f32) -> Self {
+        Self { radius: f32::INFINITY, sampling: f32::INFINITY, spacing }
+    }
+}
+
 /// Allowance for the relative rounding error: the same as for enclosures, which use the same cells.
 const GROWN: f32 = 1.0 + 1e-4;
 

@@ -9,15 +9,16 @@
 use std::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{Divide, Runs, change_both, change_together};
 use nearmiss_lanes::vector::dot;
-use nearmiss_lanes::wide::{along, greatest, greatest_of_each, least_of_each, load};
+use nearmiss_lanes::wide::{along, greatest, greatest_of_each, least_of_each, load, sum};
 
 use crate::bounds::boxes::{OrientedBox, ROUNDING};
 use crate::bounds::growth::Growth;
+use crate::patch::covering::Covering;
 use crate::point::kind::{SLAB, THICKNESS, ball, cell_radius, is_on_sheet, obstacle_ball};
 use crate::point::leaf_block::{DiscLanes, LeafBlock, LeafParts, WIDTH, sixteens};
 use crate::tree::topology::{FAN, MOST_LEAF_POINTS, Topology};
@@ -56,6 +57,14 @@ impl PartLanes {
             cell: [0.0; WIDTH],
             slab: [0.0; WIDTH],
         };
+        if points.end <= dense && lanes.discs.are_sheets {
+            for lane in 0..WIDTH {
+                let radius = lanes.discs.radius[lane];
+                lanes.cell[lane] = cell_radius(radius, reach) * GROWN;
+                lanes.slab[lane] = SLAB * radius * GROWN;
+            }
+            return lanes;
+        }
         for lane in 0..WIDTH {
             let i = points.start + lane.min(points.len() - 1);
             let (kind, radius) = (parts.discs.codes[i].kind(), lanes.discs.radius[lane]);
@@ -77,8 +86,14 @@ pub(crate) struct Low<'a> {
     /// The number of the first bottom.
     pub(crate) first: usize,
     pub(crate) bottoms: (Runs<'a, OrientedBox>, Runs<'a, [Growth; 2]>),
-    pub(crate) leaves: (Runs<'a, OrientedBox>, Runs<'a, [Growth; 2]>, Runs<'a, LeafBlock>, Runs<'a, u8>),
+    pub(crate) leaves: LeafRuns<'a>,
 }
+
+/// The boxes, growths, blocks, marks and coverings of leaves.
+type LeafRuns<'a> = (
+    (Runs<'a, OrientedBox>, Runs<'a, [Growth; 2]>),
+    (Runs<'a, LeafBlock>, (Runs<'a, u8>, Runs<'a, Covering>)),
+);
 
 impl Divide for Low<'_> {
     fn divide(self, item: usize) -> (Self, Self) {
@@ -101,7 +116,7 @@ fn leaves_under(topology: &Topology, bottom: usize) -> Range<usize> {
 /// Replaces the box of each leaf by the smallest one along its axes about the discs and balls of its
 /// points, with their greatest radius, and sets its growths to the enclosures of the surface and of the
 /// obstacle. The surface is within `beyond` of the points. Does the same for the nodes whose children
-/// are leaves, and sets blocks and marks of the leaves. O(n).
+/// are leaves, and sets blocks, marks and spacings of the leaves. O(n).
 pub(crate) fn bound_leaves(parts: &LeafParts<'_>, beyond: f32, low: Low<'_>) {
     let (topology, level, beyond) = (low.topology, Level::new(), beyond * GROWN);
     let bottoms = (topology.inner() - topology.first_bottom()).max(1);
@@ -117,7 +132,7 @@ impl Low<'_> {
     #[inline(always)]
     fn bound<S: Simd>(self, simd: S, parts: &LeafParts<'_>, beyond: f32, items: Range<usize>) {
         let Self { topology, bottoms: (bottom_boxes, bottom_growths), leaves, .. } = self;
-        let (boxes, growths, blocks, marks) = leaves;
+        let ((boxes, growths), (blocks, (marks, coverings))) = leaves;
         let mut lanes = [PartLanes::NONE; MOST_BLOCKS];
         let first_leaf = leaves_under(topology, items.start).start;
         for (place, item) in items.enumerate() {
@@ -131,7 +146,7 @@ impl Low<'_> {
                 let at = leaf - first_leaf;
                 let bounds = &mut boxes.elements[at];
                 growths.elements[at] =
-                    extents(simd, &lanes[start..count], &bounds.axes).bound(bounds, beyond);
+                    extents(simd, &lanes[start..count], &bounds.axes).bound(simd, bounds, beyond);
                 let blocks = &mut blocks.elements[at * blocks.each..(at + 1) * blocks.each];
                 for (k, block) in blocks.iter_mut().enumerate() {
                     *block = match lanes[start..count].get(k) {
@@ -140,37 +155,45 @@ impl Low<'_> {
                     };
                 }
                 marks.elements[at] = parts.marks(topology, leaf, bounds);
+                coverings.elements[at] = Covering::withheld(spacing(simd, &lanes[start..count]));
             }
             if let Some(bounds) = bottom_boxes.elements.get_mut(place) {
                 let extents = extents(simd, &lanes[..count], &bounds.axes);
-                bottom_growths.elements[place] = extents.bound(bounds, beyond);
+                bottom_growths.elements[place] = extents.bound(simd, bounds, beyond);
             }
         }
     }
 }
 
-/// Replaces the box of each node above the bottoms by the smallest one along its axes about the boxes of
-/// the bottoms under it, which are small beside it, and sets its growths to their enclosures. `boxes` and
-/// `growths` are those of all nodes. O(n log n).
+/// Replaces the boxes of the other inner nodes, and sets their growths, by the smallest ones along their axes
+/// about the boxes and enclosures of their grandchildren, or of their children if those are bottoms.
 pub(crate) fn bound_above(topology: &Topology, (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]])) {
-    let (level, first) = (Level::new(), topology.first_bottom());
-    let (above, boxes) = boxes.split_at_mut(first);
-    let (growths_above, growths) = growths.split_at_mut(first);
-    let (boxes, growths): (&[_], &[_]) = (boxes, growths);
-    change_both(above, growths_above, 1, |id, bounds, of_node| {
-        let below = topology.bottoms_under(NodeId(id32(id)));
-        let below = below.start - first..below.end - first;
-        (*bounds, *of_node) = dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
-            || about(&bounds.axes, (&boxes[below.clone()], &growths[below])),
-        ));
-    });
+    /// Fewer nodes are bounded by one thread.
+    const FEW: usize = 16;
+    let (level, mut end) = (Level::new(), topology.first_bottom());
+    // From the lowest level up. The nodes of a level are consecutive, and come before those below.
+    while end > 0 {
+        let start = topology.parent(NodeId(id32(end))).map_or(0, |(parent, _)| parent.index());
+        let (boxes, boxes_below) = boxes.split_at_mut(end);
+        let (growths, growths_below) = growths.split_at_mut(end);
+        let (boxes_below, growths_below): (&[_], &[_]) = (boxes_below, growths_below);
+        change_both(&mut boxes[start..], &mut growths[start..], FEW, |k, bounds, of_node| {
+            let below = topology.inner_below(NodeId(id32(start + k)), 2);
+            let below = below.start - end..below.end - end;
+            (*bounds, *of_node) = dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || about(simd, &bounds.axes, (&boxes_below[below.clone()], &growths_below[below])),
+            ));
+        });
+        end = start;
+    }
 }
 
 /// Returns the smallest box along some axes about some boxes, and its growths to the smallest
 /// enclosures about theirs.
 #[inline(always)]
-fn about(
+fn about<S: Simd>(
+    simd: S,
     axes: &[[f32; 3]; 3],
     (boxes, growths): (&[OrientedBox], &[[Growth; 2]]),
 ) -> (OrientedBox, [Growth; 2]) {
@@ -199,10 +222,28 @@ fn about(
     let [discs, surface, obstacle] = spans;
     let bounds = OrientedBox::spanned(*axes, discs[0], discs[1], reach);
     let own = bounds.along(axes);
-    let growths =
-        [Growth::beyond(&own, surface[0], surface[1]), Growth::beyond(&own, obstacle[0], obstacle[1])];
-    (bounds, growths)
+    (bounds, Growth::beyond_each(simd, &own, [surface, obstacle]))
 }
+
+/// Returns the root mean square of the radii of some points.
+#[inline(always)]
+fn spacing<S: Simd>(simd: S, all: &[PartLanes]) -> f32 {
+    let (mut squares, mut count) = (f32x16::splat(simd, 0.0), 0.0);
+    for PartLanes { discs, .. } in all {
+        let (radius, lanes) = (f32x16::load_array_ref(simd, &discs.radius), discs.count);
+        #[expect(clippy::cast_precision_loss, reason = "at most 16")]
+        let lanes = lanes as f32;
+        let is_used: mask32x16<S> =
+            f32x16::load_array_ref(simd, &NUMBERS).simd_lt(f32x16::splat(simd, lanes));
+        squares += is_used.select(radius * radius, f32x16::splat(simd, 0.0));
+        count += lanes;
+    }
+    (sum(squares) / count).sqrt()
+}
+
+/// The numbers of the lanes.
+const NUMBERS: [f32; WIDTH] =
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
 /// The least and greatest coordinates of some points along three axes.
 struct Extents {
@@ -219,7 +260,7 @@ impl Extents {
     /// Sets a box along the same axes, and returns its growths. The surface is within `beyond` of the
     /// points.
     #[inline(always)]
-    fn bound(&self, bounds: &mut OrientedBox, beyond: f32) -> [Growth; 2] {
+    fn bound<S: Simd>(&self, simd: S, bounds: &mut OrientedBox, beyond: f32) -> [Growth; 2] {
         let Self { discs, cells, points, reach } = self;
         *bounds = OrientedBox::spanned(bounds.axes, discs[0], discs[1], *reach);
         let own = bounds.along(&bounds.axes);
@@ -227,7 +268,7 @@ impl Extents {
         for k in 0..3 {
             (low[k], high[k]) = (low[k] - beyond, high[k] + beyond);
         }
-        [Growth::beyond(&own, low, high), Growth::beyond(&own, cells[0], cells[1])]
+        Growth::beyond_each(simd, &own, [[low, high], *cells])
     }
 }
 

@@ -43,6 +43,12 @@ impl PointCode {
         PointKind::from_code(self.0 & ((1 << KIND_BITS) - 1))
     }
 
+    /// Returns `true` if all these points sample sheets.
+    #[inline(always)]
+    pub(crate) fn are_sheets(codes: &[Self]) -> bool {
+        codes.iter().fold(0, |bits, code| bits | code.0) & NO_SHEET == 0
+    }
+
     /// Returns `true` if [`Self::new`] can return this code.
     #[inline]
     pub(crate) const fn is_sound(self) -> bool {
@@ -64,6 +70,9 @@ impl PointCode {
         (radius * SHARES[usize::from(self.0)]).min(0.5 * reach)
     }
 }
+
+/// The bits of a code of which at least one is set unless the point samples a sheet.
+const NO_SHEET: u8 = ((1 << KIND_BITS) - 1) & !PointKind::Edge.code();
 
 /// The greatest border value of a code: at a border.
 #[expect(clippy::cast_possible_truncation, reason = "3")]
@@ -121,5 +130,22 @@ impl DiscRadii<'_> {
     /// Returns the radii of all discs, in the order of the points.
     pub fn iter(&self) -> impl Iterator<Item = f32> + '_ {
         (0..self.codes.len()).map(|i| self.get(i))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_tell_whether_all_points_sample_sheets() {
+        for code in 0..=u8::MAX {
+            let is_sheet = PointCode(code).kind().is_sheet();
+            for place in 0..3 {
+                let mut codes = [PointCode::new(PointKind::Edge, 9); 3];
+                codes[place] = PointCode(code);
+                assert_eq!(PointCode::are_sheets(&codes), is_sheet, "code {code} at {place}");
+            }
+        }
     }
 }

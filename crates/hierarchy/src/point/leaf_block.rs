@@ -10,7 +10,7 @@ use nearmiss_lanes::parallel::{change_each, fill};
 use nearmiss_lanes::wide::spread_out;
 
 use crate::bounds::boxes::OrientedBox;
-use crate::point::disc::DiscRadii;
+use crate::point::disc::{DiscRadii, PointCode};
 use crate::point::kind::is_on_sheet;
 use crate::tree::topology::Topology;
 
@@ -201,6 +201,8 @@ pub(crate) struct DiscLanes {
     pub(crate) disc: [f32; WIDTH],
     /// The number of points.
     pub(crate) count: usize,
+    /// `true` if all points sample sheets.
+    pub(crate) are_sheets: bool,
 }
 
 impl DiscLanes {
@@ -210,6 +212,7 @@ impl DiscLanes {
         radius: [0.0; WIDTH],
         disc: [0.0; WIDTH],
         count: 0,
+        are_sheets: true,
     };
 }
 
@@ -293,19 +296,27 @@ impl LeafParts<'_> {
         spread_out(&self.positions[points.clone()], &mut position);
         spread_out(&self.normals[points.clone()], &mut normal);
         let (codes, radius) = (repeated(&codes[points.clone()]), repeated(&radii[points.clone()]));
-        let mut lanes = DiscLanes { position, normal, radius, disc: [0.0; WIDTH], count: points.len() };
-        for lane in 0..WIDTH {
-            lanes.disc[lane] = codes[lane].disc(radius[lane], reach, sampling_radius);
+        let (are_sheets, mut disc) = (PointCode::are_sheets(&codes), [0.0; WIDTH]);
+        if are_sheets {
+            for lane in 0..WIDTH {
+                disc[lane] = codes[lane].disc_of_sheet(radius[lane], reach);
+            }
+        } else {
+            for lane in 0..WIDTH {
+                disc[lane] = codes[lane].disc(radius[lane], reach, sampling_radius);
+            }
         }
-        lanes
+        DiscLanes { position, normal, radius, disc, count: points.len(), are_sheets }
     }
 
     /// Returns the marks of a leaf; `bounds` is its box.
     pub(crate) fn marks(&self, topology: &Topology, leaf: usize, bounds: &OrientedBox) -> u8 {
         let kind = |i: usize| self.discs.codes[i].kind();
         let points = topology.points_of_leaf(leaf);
-        let is_sparse = points.clone().any(|i| kind(i).is_sparse());
-        let has_balls = points.into_iter().any(|i| !is_on_sheet(i, self.dense, kind(i)));
+        // Most leaves have neither.
+        let is_plain = points.end <= self.dense && PointCode::are_sheets(&self.discs.codes[points.clone()]);
+        let is_sparse = !is_plain && points.clone().any(|i| kind(i).is_sparse());
+        let has_balls = !is_plain && points.into_iter().any(|i| !is_on_sheet(i, self.dense, kind(i)));
         let is_loose = bounds.half[0] > LOOSE_FROM * bounds.reach;
         let marks = [(SPARSE, is_sparse), (BALLS, has_balls), (LOOSE, is_loose)];
         marks.into_iter().filter(|mark| mark.1).fold(0, |marks, mark| marks | mark.0)

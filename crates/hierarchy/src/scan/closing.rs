@@ -3,8 +3,8 @@
 
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{both, change_each, fill, runs};
-use nearmiss_lanes::wide::greatest_of;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::{both, change_each, runs};
 use nearmiss_store::Array;
 use nearmiss_surface::SurfacePlan;
 
@@ -99,8 +99,7 @@ impl Closing {
             },
             dense: meta.dense as usize,
         };
-        let greatest = greatest_of(&arrays.radii);
-        let beyond = 0.5 * plan.support_radius(greatest);
+        let beyond = 0.5 * plan.support_radius(self.selection.greatest());
         let (bottoms, leaves) = (topology.first_bottom(), topology.inner());
         let (boxes, leaf_boxes) = boxes.split_at_mut(leaves);
         let (growths, leaf_growths) = growths.split_at_mut(leaves);
@@ -109,7 +108,10 @@ impl Closing {
             topology,
             first: 0,
             bottoms: (runs(&mut boxes[bottoms..], 1), runs(&mut growths[bottoms..], 1)),
-            leaves: (runs(leaf_boxes, 1), runs(leaf_growths, 1), blocks, runs(arrays.marks.to_mut(), 1)),
+            leaves: (
+                (runs(leaf_boxes, 1), runs(leaf_growths, 1)),
+                (blocks, (runs(arrays.marks.to_mut(), 1), runs(&mut arrays.coverings.to_mut()[leaves..], 1))),
+            ),
         };
         bound_leaves(&parts, beyond, low);
     }
@@ -119,9 +121,9 @@ impl Closing {
         let PointHierarchy { meta, topology, arrays, positions, .. } = scan;
         let positions: &[[f32; 3]] = positions.get().map_or(&[], |positions| positions);
         let (normals, codes, radii): (&[_], &[_], &[_]) = (&arrays.normals, &arrays.codes, &arrays.radii);
-        let Self { boxes, growths, .. } = self;
+        let Self { boxes, growths, spreads, .. } = self;
         let bound = || {
-            spacings(topology, radii, arrays.coverings.to_mut());
+            spacings(topology, spreads, arrays.coverings.to_mut());
             bound_above(topology, (boxes, growths));
             let (boxes, growths): (&[_], &[[Growth; 2]]) = (boxes, growths);
             siblings(topology, boxes, arrays.siblings.to_mut());
@@ -136,26 +138,16 @@ impl Closing {
     }
 }
 
-/// Sets the spacings of all nodes, and withholds their radii.
-fn spacings(topology: &Topology, radii: &[f32], coverings: &mut [Covering]) {
-    let withheld = |spacing| Covering { radius: f32::INFINITY, sampling: f32::INFINITY, spacing };
-    let inner = topology.inner();
-    fill(&mut coverings[inner..], |leaf| {
-        let radii = &radii[topology.points_of_leaf(leaf)];
-        #[expect(clippy::cast_precision_loss, reason = "a mean")]
-        let mean = radii.iter().map(|r| r * r).sum::<f32>() / radii.len() as f32;
-        withheld(mean.sqrt())
-    });
+/// Sets the spacings of the inner nodes from those of leaves, and withholds their radii.
+fn spacings(topology: &Topology, spreads: &[Spread], coverings: &mut [Covering]) {
     // Children come after their parent.
-    for id in topology.ids().take(inner).rev() {
-        let of = |child: NodeId| {
-            #[expect(clippy::cast_precision_loss, reason = "a mean")]
-            let count = topology.points(child).len() as f32;
-            coverings[child.index()].spacing.powi(2) * count
-        };
-        let sum: f32 = topology.children(id).iter().map(of).sum();
-        #[expect(clippy::cast_precision_loss, reason = "a mean")]
-        let count = topology.points(id).len() as f32;
-        coverings[id.index()] = withheld((sum / count).sqrt());
+    for id in (0..topology.inner()).rev() {
+        let mut squares = 0.0;
+        for child in topology.children(NodeId(id32(id))).iter() {
+            squares += f64::from(coverings[child.index()].spacing).powi(2) * spreads[child.index()].count;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+        let spacing = (squares / spreads[id].count).sqrt() as f32;
+        coverings[id] = Covering::withheld(spacing);
     }
 }

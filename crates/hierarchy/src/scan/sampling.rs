@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::parallel::{both, change_each, fill, ranges};
-use nearmiss_lanes::wide::WIDTH;
+use nearmiss_lanes::wide::{WIDTH, greatest};
 use nearmiss_store::{Room, Workspace};
 use nearmiss_surface::SurfacePlan;
 
@@ -114,6 +114,7 @@ pub(crate) struct Selection {
     sample: Vec<f32>,
     /// The radii of both halves between two bounds.
     between: [Vec<f32>; 2],
+    greatest: f32,
 }
 
 impl Selection {
@@ -125,7 +126,7 @@ impl Selection {
         const MARGIN: usize = 38;
         /// One in this many radii is expected in each half.
         const USUAL: usize = 16;
-        let Self { sample, between: [found, more] } = self;
+        let Self { sample, between: [found, more], greatest } = self;
         sample.clear();
         sample.extend(radii.iter().step_by(radii.len().div_ceil(SAMPLE)));
         sample.sort_unstable_by(f32::total_cmp);
@@ -139,7 +140,8 @@ impl Selection {
         let (left, right) = radii.split_at(radii.len() / 2);
         let (left, right) = both(|| ranks(left, bounds, found), || ranks(right, bounds, more));
         found.append(more);
-        let [below, to_low, to_high] = [0, 1, 2].map(|k| left[k] + right[k]);
+        *greatest = left.1.max(right.1);
+        let [below, to_low, to_high] = [0, 1, 2].map(|k| left.0[k] + right.0[k]);
         let rank = sampling_rank(radii.len());
         if (below..to_low).contains(&rank) {
             bounds[0]
@@ -154,11 +156,16 @@ impl Selection {
             *found.select_nth_unstable_by(rank, f32::total_cmp).1
         }
     }
+
+    /// Returns the greatest of the radii that were last selected from, at least 0.
+    pub(crate) const fn greatest(&self) -> f32 {
+        self.greatest
+    }
 }
 
 /// Appends the radii between `low` and `high` to `between`. Returns the numbers of radii that are less
-/// than `low`, at most `low`, and at most `high`.
-fn ranks(radii: &[f32], bounds: [f32; 2], between: &mut Vec<f32>) -> [usize; 3] {
+/// than `low`, at most `low`, and at most `high`, with the greatest radius.
+fn ranks(radii: &[f32], bounds: [f32; 2], between: &mut Vec<f32>) -> ([usize; 3], f32) {
     dispatch!(Level::new(), simd => simd.vectorize(
         #[inline(always)]
         || ranks_in_lanes(simd, radii, bounds, between),
@@ -171,12 +178,14 @@ fn ranks_in_lanes<S: Simd>(
     radii: &[f32],
     [low, high]: [f32; 2],
     between: &mut Vec<f32>,
-) -> [usize; 3] {
+) -> ([usize; 3], f32) {
     let (lows, highs) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
+    let mut most = f32x16::splat(simd, 0.0);
     let mut counts = [0; 3];
     let (rows, rest) = radii.as_chunks::<WIDTH>();
     for row in rows {
         let lanes = f32x16::load_array_ref(simd, row);
+        most = most.max(lanes);
         // No closure: it may be compiled without the instruction set of the caller.
         let below: mask32x16<S> = lanes.simd_lt(lows);
         let to_low: mask32x16<S> = lanes.simd_le(lows);
@@ -198,7 +207,7 @@ fn ranks_in_lanes<S: Simd>(
         counts[2] += usize::from(radius <= high);
         between.extend((radius > low && radius < high).then_some(radius));
     }
-    counts
+    (counts, greatest(most, rest.iter().copied().fold(0.0, f32::max)))
 }
 
 /// Returns the index of the sampling radius among `count` ascending radii.
@@ -241,6 +250,7 @@ mod tests {
             sorted.sort_unstable_by(f32::total_cmp);
             let expected = sorted[sampling_rank(radii.len())];
             assert_eq!(selection.of(&radii), expected, "of {} radii", radii.len());
+            assert_eq!(selection.greatest(), sorted[radii.len() - 1], "of {} radii", radii.len());
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::tree::topology::Topology;
 /// The moments of some points about their mean.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Spread {
-    count: f64,
+    pub(crate) count: f64,
     pub(crate) mean: [f64; 3],
     /// The sums of the products of coordinates relative to the mean, as xx xy xz yy yz zz.
     pub(crate) second: [f64; 6],

@@ -340,11 +340,14 @@ impl Topology {
         leaves.start as usize..leaves.end as usize
     }
 
-    /// Returns the nodes under an inner node whose children are leaves, by their ids. The node itself
-    /// if it is one of them.
-    pub(crate) fn bottoms_under(&self, id: NodeId) -> Range<usize> {
+    /// Returns the nodes that are this many levels below an inner node, by their ids, or the lowest inner
+    /// nodes under it if those are nearer.
+    pub(crate) fn inner_below(&self, id: NodeId, levels: u32) -> Range<usize> {
         let (mut first, mut last) = (id.0, id.0);
-        while first < self.bottom {
+        for _ in 0..levels {
+            if first >= self.bottom {
+                break;
+            }
             let children = self.children(NodeId(last));
             (first, last) = (self.children(NodeId(first)).first, children.first + children.count - 1);
         }
@@ -436,14 +439,17 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_inner_nodes_under_a_node_share_its_leaves() {
+    fn the_inner_nodes_of_a_level_under_a_node_share_its_leaves() {
         for tree in trees().filter(|tree| tree.len() < 3000 && tree.inner() > 0) {
             for id in tree.ids().filter(|&id| !tree.is_leaf(id)) {
-                let bottoms = tree.bottoms_under(id);
-                let leaves = bottoms.clone().map(|node| tree.leaves_under(NodeId(id32(node))));
-                let all: Vec<usize> = leaves.flatten().collect();
-                assert_eq!(all, tree.leaves_under(id).collect::<Vec<_>>(), "{tree:?}, {id:?}");
-                assert!(bottoms.start >= tree.first_bottom(), "{tree:?}, {id:?}");
+                for levels in [0, 1, 2, 32] {
+                    let below = tree.inner_below(id, levels);
+                    let leaves = below.clone().map(|node| tree.leaves_under(NodeId(id32(node))));
+                    let all: Vec<usize> = leaves.flatten().collect();
+                    assert_eq!(all, tree.leaves_under(id).collect::<Vec<_>>(), "{tree:?}, {id:?}, {levels}");
+                    assert!(levels < 32 || below.start >= tree.first_bottom(), "{tree:?}, {id:?}");
+                    assert!(below.len() <= 4_usize.saturating_pow(levels), "{tree:?}, {id:?}, {levels}");
+                }
             }
         }
     }

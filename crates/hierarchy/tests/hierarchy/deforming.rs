@@ -3,7 +3,8 @@
 
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{
-    BuildOptions, DeformError, DeformingScan, GatherScratch, OrientedBox, Part, PointHierarchy, SLAB,
+    BuildOptions, DeformError, DeformingScan, GatherScratch, OrientedBox, Part, PointHierarchy, PointKind,
+    SLAB,
 };
 use nearmiss_surface::{Status, SurfaceOptions, project};
 use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, pose, rng};
@@ -106,6 +107,17 @@ fn check_enclosed(scan: &PointHierarchy, seed: u64, name: &str) -> [usize; 2] {
     found
 }
 
+/// Asserts that the spacing of each node is the root mean square of the radii under it.
+fn check_spacings(scan: &PointHierarchy, name: &str) {
+    for id in scan.topology().ids() {
+        let radii = &scan.radii()[scan.topology().points(id)];
+        let squares: f64 = radii.iter().map(|r| f64::from(*r).powi(2)).sum();
+        let expected = (squares / radii.len() as f64).sqrt();
+        let found = f64::from(scan.arrays().coverings[id.index()].spacing);
+        assert!((found - expected).abs() <= 1e-5 * expected, "{name}: {id:?} has {found}, not {expected}");
+    }
+}
+
 /// The default surface, for the naive implementation of f.
 fn parameters() -> Parameters {
     let surface = SurfaceOptions::default();
@@ -133,6 +145,7 @@ fn a_moved_scan_is_valid_in_every_frame() {
                 };
                 assert_eq!(refitted.carried + refitted.fitted, scan.len(), "{name}");
                 assert_eq!(scan.sanity_check(), Ok(()), "{name}");
+                check_spacings(&scan, &name);
                 let of_frame = check_enclosed(&scan, number, &name);
                 found = [0, 1].map(|k| found[k] + of_frame[k]);
                 if leaf_size == 16 && name.ends_with("bend") {
@@ -143,6 +156,34 @@ fn a_moved_scan_is_valid_in_every_frame() {
     }
     assert!(found.iter().all(|&found| found > 20_000), "{found:?} places of surfaces and obstacles");
     assert!(compared > 1000, "f was compared with its naive sum at {compared} places");
+}
+
+/// Sparse points come last in the order and are balls in the obstacle, also in a frame in which they sample a
+/// sheet.
+#[test]
+fn points_that_were_sparse_remain_balls() {
+    let lattice = |n: u32, spacing: f64, away: f64| {
+        (0..n * n).map(move |i| [spacing * f64::from(i % n) + away, spacing * f64::from(i / n), 0.0])
+    };
+    let points: Vec<[f64; 3]> = lattice(70, 0.1, 0.0).chain(lattice(15, 3.0, 500.0)).collect();
+    let gathered: Vec<[f64; 3]> = lattice(70, 0.1, 0.0).chain(lattice(15, 0.1, 20.0)).collect();
+    let mut scan = DeformingScan::new(&points, &BuildOptions::default()).unwrap();
+    scan.renew(&gathered).unwrap();
+    assert_eq!(scan.sanity_check(), Ok(()));
+    let (arrays, mut sheets) = (scan.arrays(), 0);
+    for i in arrays.dense..scan.len() {
+        let leaf = scan.topology().leaf_of(i);
+        assert!(arrays.leaves.has_balls(scan.topology().leaf_number(leaf)), "point {i}");
+        let (ball, enclosure) = (arrays.obstacle_ball(i), scan.tree().enclosure(Part::Obstacle, leaf));
+        assert!(ball > 0.3 * scan.radii()[i], "point {i} has a ball of {ball}");
+        for side in [-0.999, 0.999] {
+            let x = [0, 1, 2].map(|k| scan.positions()[i][k] + side * ball * scan.normals()[i][k]);
+            let beyond = outside(&enclosure, x.map(f64::from));
+            assert!(beyond <= 0.0, "the ball of point {i} is {beyond} outside");
+        }
+        sheets += usize::from(scan.kind(i) == PointKind::Sheet);
+    }
+    assert!(sheets > 100, "{sheets} of {} sample a sheet", scan.len() - arrays.dense);
 }
 
 #[test]
