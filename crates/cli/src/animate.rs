@@ -138,25 +138,26 @@ fn is_kinetic(
     if !are_meshes || args.rate < OFTEN || frames.len() < 2 {
         return Ok(false);
     }
-    // From the first file to the second, the knot between them included.
-    let mut meshes = KineticMeshes::new(frames, partner)?;
-    let kinetic = meshes.at(1.0)?;
     let mut refitting = Told { is_quiet: true, ..Told::new(args) };
     let moments = [0.0, 1.0 / args.rate].into_iter();
     refitting.follow_frames(frames, partner, Following::Refit, moments)?;
-    let [refit, asked] = refitting.summary.last();
+    let per_time: f64 = refitting.summary.last().iter().sum();
+    // From the first file to the second, the knot between them included, unless that takes longer.
+    let kinetic = KineticMeshes::new(frames, partner)?.first_second(args.rate * per_time)?;
     // Moving by events takes a time for each second, everything else for each query time.
-    let saved = refit + asked - kinetic.query_micros;
-    let crossover = if saved > 0.0 { kinetic.update_micros / saved } else { f64::INFINITY };
-    let is_kinetic = args.rate > crossover;
+    let crossover = kinetic.and_then(|kinetic| {
+        let saved = per_time - kinetic.query_micros;
+        (saved > 0.0).then(|| kinetic.update_micros / saved)
+    });
+    let is_kinetic = crossover.is_some_and(|crossover| args.rate > crossover);
     console.note(format_args!(
         "{} at {} query times a second; kinetic trees take less time {}",
         if is_kinetic { "kinetic trees" } else { "refitting" },
         short(args.rate),
-        if crossover.is_finite() {
-            format!("from about {} on", short(crossover))
-        } else {
-            "at no rate".into()
+        match (crossover, kinetic) {
+            (Some(crossover), _) => format!("from about {} on", short(crossover)),
+            (None, Some(_)) => "at no rate".into(),
+            (None, None) => "at higher rates, if at all".into(),
         }
     ));
     Ok(is_kinetic)

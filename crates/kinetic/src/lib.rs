@@ -22,8 +22,11 @@ mod tree;
 mod pairs;
 mod separation;
 
+mod self_separation;
+
 pub use counts::Counts;
 pub use error::KineticError;
 pub use plan::FlightPlan;
-pub use separation::{FirstContact, SelfSeparationList, SeparationList};
+pub use self_separation::SelfSeparationList;
+pub use separation::{FirstContact, SeparationList};
 pub use tree::KineticTree;

@@ -63,6 +63,22 @@ impl KineticMeshes {
         })
     }
 
+    /// Moves the meshes through the first second, then tests them. `None` as soon as moving them has
+    /// taken more than `most` microseconds.
+    pub(super) fn first_second(mut self, most: f64) -> Result<Option<Moment>, CliError> {
+        /// The time is looked at this many times.
+        const STEPS: u32 = 64;
+        let start = now();
+        for step in 1..=STEPS {
+            self.advance(f64::from(step) / f64::from(STEPS))?;
+            if micros_since(start) > most {
+                return Ok(None);
+            }
+        }
+        let update_micros = micros_since(start);
+        Ok(Some(Moment { update_micros, ..self.at(1.0)? }))
+    }
+
     fn advance(&mut self, t: f64) -> Result<(), CliError> {
         match self {
             Self::Two { trees, list } => {
@@ -88,21 +104,17 @@ impl KineticMeshes {
     /// Returns `true` if two triangles have a point in common. Those of one mesh that share a corner do
     /// not count.
     fn meets(&self) -> bool {
-        let mut meets = false;
         match self {
             Self::Two { trees, list } => {
                 let [a, b] = &**trees;
-                list.for_each_overlap(a, b, |i, j| {
-                    meets = meets || Some(true) == pair_meets([a, b], [i, j]);
-                });
+                list.any_overlap(a, b, |i, j| Some(true) == pair_meets([a, b], [i, j]))
             }
-            Self::One { tree, list } => list.for_each_overlap(tree, |i, j| {
+            Self::One { tree, list } => list.any_overlap(tree, |i, j| {
                 let corners = [i, j].map(|triangle| tree.primitive(triangle).unwrap_or_default());
                 let are_apart = !corners[0].iter().any(|corner| corners[1].contains(corner));
-                meets = meets || are_apart && Some(true) == pair_meets([tree; 2], [i, j]);
+                are_apart && Some(true) == pair_meets([tree; 2], [i, j])
             }),
         }
-        meets
     }
 }
 

@@ -12,6 +12,19 @@ fn depth(a: &Aabb, b: &Aabb) -> f64 {
     (0..3).map(|k| (a.max[k] - b.min[k]).min(b.max[k] - a.min[k])).fold(f64::INFINITY, f64::min)
 }
 
+/// Checks that a search among the `found` pairs ends at the one that is looked for.
+fn check_any<T>(found: &[T], any_overlap: impl Fn(&mut dyn FnMut(u32, u32) -> bool) -> bool) {
+    for most in [1, found.len() / 2, found.len() + 1] {
+        let mut calls = 0;
+        let has_found = any_overlap(&mut |_, _| {
+            calls += 1;
+            calls == most
+        });
+        assert_eq!(has_found, (1..=found.len()).contains(&most), "{most} of {}", found.len());
+        assert_eq!(calls, if has_found { most } else { found.len() }, "none after the one that is found");
+    }
+}
+
 #[test]
 fn overlaps_are_those_of_loops() {
     let rng = &mut rng(21);
@@ -27,6 +40,7 @@ fn overlaps_are_those_of_loops() {
             list.advance(&mut a.tree, &mut b.tree, time).unwrap();
             let mut found = Vec::new();
             list.for_each_overlap(&a.tree, &b.tree, |i, j| found.push((i, j)));
+            check_any(&found, |wanted| list.any_overlap(&a.tree, &b.tree, wanted));
             found.sort_unstable();
             let mut once = found.clone();
             once.dedup();
@@ -58,6 +72,7 @@ fn overlaps_of_one_tree_are_those_of_loops() {
             list.advance(&mut model.tree, time).unwrap();
             let mut found = Vec::new();
             list.for_each_overlap(&model.tree, |i, j| found.push([i.min(j), i.max(j)]));
+            check_any(&found, |wanted| list.any_overlap(&model.tree, wanted));
             found.sort_unstable();
             let mut once = found.clone();
             once.dedup();
