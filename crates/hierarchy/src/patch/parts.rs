@@ -166,19 +166,26 @@ impl Low<'_> {
 }
 
 /// Replaces the boxes of the other inner nodes, and sets their growths, by the smallest ones along their axes
-/// about the boxes and enclosures of their grandchildren, or of their children if those are bottoms.
+/// about smaller boxes and enclosures under them: up to three levels above the bottoms those of the bottoms,
+/// further up those of the nodes two levels above the bottoms. O(n log n).
 pub(crate) fn bound_above(topology: &Topology, (boxes, growths): (&mut [OrientedBox], &mut [[Growth; 2]])) {
     /// Fewer nodes are bounded by one thread.
     const FEW: usize = 16;
-    let (level, mut end) = (Level::new(), topology.first_bottom());
+    /// The height above the bottoms up to which these bound a node.
+    const LOW: u32 = 3;
+    /// The height of the nodes that bound those above.
+    const MIDDLE: u32 = 2;
+    let (level, mut end, mut height) = (Level::new(), topology.first_bottom(), 0);
     // From the lowest level up. The nodes of a level are consecutive, and come before those below.
     while end > 0 {
+        height += 1;
+        let levels = if height > LOW { height - MIDDLE } else { height };
         let start = topology.parent(NodeId(id32(end))).map_or(0, |(parent, _)| parent.index());
         let (boxes, boxes_below) = boxes.split_at_mut(end);
         let (growths, growths_below) = growths.split_at_mut(end);
         let (boxes_below, growths_below): (&[_], &[_]) = (boxes_below, growths_below);
         change_both(&mut boxes[start..], &mut growths[start..], FEW, |k, bounds, of_node| {
-            let below = topology.inner_below(NodeId(id32(start + k)), 2);
+            let below = topology.inner_below(NodeId(id32(start + k)), levels);
             let below = below.start - end..below.end - end;
             (*bounds, *of_node) = dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
