@@ -1,7 +1,6 @@
 //! Methods that are measured against each other, ours and those that users would pick instead,
 //! behind one trait.
 
-#[cfg(feature = "eigen")]
 pub mod eigen;
 pub mod grid;
 pub mod jacobi;

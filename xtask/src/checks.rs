@@ -68,7 +68,7 @@ fn beside(name: &str) -> Outcome<Command> {
 /// Verifies answers, counts and shapes with known answers; then the proofs of a scan near itself.
 fn verify() -> Outcome {
     // Together with the command line, since they then have the features of this program and share its
-    // libraries; without rivals that take long to compile.
+    // libraries.
     let packages =
         ["-p", "nearmiss-benches", "-p", "check-proof", "-p", "nearmiss-cli", "--no-default-features"];
     let programs = ["--bin", "verify", "--bin", "check-proof"];

@@ -1,6 +1,5 @@
 //! Solvers of the symmetric 3×3 eigenproblem: ours, and what users would pick instead.
 
-use faer::Side;
 use glamx::DSymmetricEigen3;
 use glamx::glam::DMat3;
 use nalgebra::{Matrix3, SVD, SymmetricEigen};
@@ -102,7 +101,7 @@ impl Contender for Batch {
     }
 }
 
-/// All solvers, ours first. The batch solver occurs once for each instruction set of this machine.
+/// All solvers, ours first; faer with the feature `faer`. The batch solver occurs once for each instruction set of this machine.
 #[must_use]
 pub fn contenders() -> Vec<Box<dyn Contender>> {
     let mut all: Vec<Box<dyn Contender>> = vec![one_by_one("single", |m| m, |m| symmetric_eigen(*m), all_of)];
@@ -138,8 +137,9 @@ pub fn contenders() -> Vec<Box<dyn Contender>> {
             |m| SVD::try_new(*m, true, true, f64::EPSILON, ITERATIONS),
             of_svd,
         ),
-        one_by_one("faer", matrix, faer_eigen, |e| *e),
     ]);
+    #[cfg(feature = "faer")]
+    all.push(one_by_one("faer", matrix, faer_eigen, |e| *e));
     all
 }
 
@@ -194,8 +194,9 @@ fn of_svd(svd: &Option<SVD<f64, nalgebra::U3, nalgebra::U3>>) -> Option<Answer> 
     Some(sorted(values, v.into()))
 }
 
+#[cfg(feature = "faer")]
 fn faer_eigen(m: &Matrix3<f64>) -> Option<Answer> {
-    let eigen = faer::Mat::from_fn(3, 3, |i, j| m[(i, j)]).self_adjoint_eigen(Side::Lower).ok()?;
+    let eigen = faer::Mat::from_fn(3, 3, |i, j| m[(i, j)]).self_adjoint_eigen(faer::Side::Lower).ok()?;
     let (values, vectors) = (eigen.S(), eigen.U());
     let vectors = [0, 1, 2].map(|k| [0, 1, 2].map(|i| vectors[(i, k)]));
     Some(sorted([0, 1, 2].map(|i| values[i]), vectors))

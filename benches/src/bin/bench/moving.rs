@@ -2,7 +2,8 @@
 //! of each. Frames of a depth camera that replace each other.
 //!
 //! Methods are compared frame by frame, so each finds what the others left in the caches. Rows that say
-//! "alone" are of a program that follows the same frames by one method, with the same questions about each.
+//! "alone" are of a program that follows the same frames by one method, with the same questions about each. It
+//! writes each frame just before, as a simulation or a camera does; the other rows read it from where all are kept.
 //!
 //! The frames of a mesh are files. A scan of it has points that are spread over the surface of the
 //! first frame and move with their triangles. Two copies are asked in every frame, at the same poses
@@ -268,7 +269,7 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
     times.into_iter().zip(names).for_each(|(times, name)| times.row(name));
     for (name, by_refits) in [("refit, alone", true), ("renew, alone", false)] {
         let scan = RefCell::new(MovingScan::new(&frames[0], &built)?);
-        let follow = |frame: &Vec<[f64; 3]>| {
+        let follow = |frame: &[[f64; 3]]| {
             let mut scan = scan.borrow_mut();
             if by_refits {
                 scan.refit(frame).map(drop)?
@@ -282,7 +283,7 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
             let about = about(&poses, scan.bounds().centre());
             about.iter().try_for_each(|pose| ask(&scan, pose, &mut Times::default()).map(drop))
         };
-        alone(name, frames.iter(), follow, ask)?;
+        alone(name, &frames, follow, ask)?;
     }
     let Totals { differ, beyond, proven, apart, fitted, most, loosest } = totals;
     println!(

@@ -131,7 +131,7 @@ fn depth_frames_alone(
     let mut scratch = Scratch::default();
     for (name, by_pixels) in [("replaced by pixels, alone", true), ("replaced by points, alone", false)] {
         let scan = RefCell::new(MovingScan::new(first, &BuildOptions::default())?);
-        let follow = |frame: &Vec<[f64; 3]>| {
+        let follow = |frame: &[[f64; 3]]| {
             let mut scan = scan.borrow_mut();
             if by_pixels {
                 scan.replace_organised(frame, width)?
@@ -140,7 +140,7 @@ fn depth_frames_alone(
             }
             Ok(())
         };
-        let ask = |frame: &Vec<[f64; 3]>| {
+        let ask = |frame: &[[f64; 3]]| {
             let scan = scan.borrow();
             let plan = CollidePlan::new(&asked, &scan, tool)?;
             let step = frame.len() / poses.max(1) as usize;
@@ -150,7 +150,7 @@ fn depth_frames_alone(
             }
             Ok(())
         };
-        alone(name, frames.iter(), follow, ask)?;
+        alone(name, frames, follow, ask)?;
     }
     Ok(())
 }

@@ -28,17 +28,19 @@ impl Times {
     }
 }
 
-/// Follows frames by one method alone, with questions about each frame.
-pub(crate) fn alone<'f, F: 'f + ?Sized>(
+/// Follows frames by one method alone, with questions about each frame. Each frame is written to the same
+/// memory just before, as by a simulation or a camera.
+pub(crate) fn alone(
     name: &str,
-    frames: impl Iterator<Item = &'f F>,
-    mut follow: impl FnMut(&'f F) -> Result<(), Failure>,
-    mut ask: impl FnMut(&'f F) -> Result<(), Failure>,
+    frames: &Frames,
+    mut follow: impl FnMut(&[[f64; 3]]) -> Result<(), Failure>,
+    mut ask: impl FnMut(&[[f64; 3]]) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let mut times = Times::default();
+    let (mut times, mut now) = (Times::default(), Vec::new());
     for frame in frames {
-        times.of(|| follow(frame))?;
-        ask(frame)?;
+        now.clone_from(frame);
+        times.of(|| follow(&now))?;
+        ask(&now)?;
     }
     times.row(name);
     Ok(())
