@@ -21,7 +21,7 @@ use crate::solid::hint::ShapeHint;
 use crate::solid::plan::ShapePlan;
 use crate::solid::ray::{Ray, RayAnswer, RayHit, StoredRay};
 use crate::solid::shape::Shape;
-use crate::solid::touch::touch;
+use crate::solid::touch::touch_shape;
 
 /// A placed scan, with the meaning of a plan, as the target of convex [shapes](Shape) and
 /// [rays](Ray).
@@ -97,7 +97,7 @@ impl<'a> Target<'a> {
             return ShapeAnswer { verdict, band: f64::INFINITY };
         }
         let level = scratch.level();
-        touch(&self.elements, self.solid(shape).as_ref(), (level, &mut scratch.contact.gathers[0]))
+        touch_shape(&self.elements, shape, (level, &mut scratch.contact.gathers[0]))
     }
 
     /// Bounds the distance of a shape and the scan: lower ≤ distance ≤ upper. `None` if the nearest disc

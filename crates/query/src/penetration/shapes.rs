@@ -60,7 +60,7 @@ impl ShapeProbe<'_, '_> {
     /// Asks whether the shape touches the scan after a shift.
     fn touch_at(&mut self, t: Vector) -> ShapeAnswer {
         self.spent.evaluations += 1;
-        touch(self.elements, Some(&self.solid.shifted(&t)), (self.level, &mut *self.scratch))
+        touch(self.elements, Some(&self.solid.shifted(&t)), None, (self.level, &mut *self.scratch))
     }
 
     /// Finds a shift after which the shape touches nothing.

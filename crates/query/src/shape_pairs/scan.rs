@@ -77,7 +77,7 @@ impl<'a> ShapeScanPair<'a> {
     pub fn touch(&self, plan: &ShapePlan, scratch: &mut Scratch) -> ShapeAnswer {
         let level = scratch.level();
         let scratch = &mut scratch.contact.gathers[0];
-        self.ask(plan, |elements, solid| touch(elements, solid, (level, scratch))).unwrap_or(INVALID)
+        self.ask(plan, |elements, solid| touch(elements, solid, None, (level, scratch))).unwrap_or(INVALID)
     }
 
     /// Bounds the distance of the shape and the scan. `None` if the nearest disc or ball is further away

@@ -7,6 +7,7 @@ use nearmiss_hierarchy::{Clearance, ClearanceGrid};
 
 use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
+use crate::solid::shape::Shape;
 
 /// The maximum number of parts of a core.
 const MOST_PARTS: usize = 11;
@@ -33,16 +34,36 @@ pub(crate) fn is_far(elements: &Elements<'_>, solid: &Solid<'_>) -> bool {
     told.is_some_and(|at| at.discs > within)
 }
 
+/// Returns what the grid tells about the centre of a shape, and whether that proves that no part of the scan
+/// is within the margin of a ball about the shape: the core of such a shape need not be worked out. `None`
+/// without a grid, and for shapes of any places.
+///
+/// `proven` selects the volumes that contain the obstacle instead of the discs and balls.
+#[inline(always)]
+pub(crate) fn about<'a>(
+    elements: &Elements<'a>,
+    shape: &Shape<'_>,
+    proven: bool,
+) -> Option<(Clearance<'a>, bool)> {
+    let (grid, (centre, [radius, beyond])) = (elements.clear?, shape.ball()?);
+    let placed = elements.placed.stored_to_world();
+    let within = elements.margin + radius / placed.scale();
+    let at = grid.at(&elements.arrays, placed.apply_inverse(centre), within);
+    let bound = if proven { at.obstacle } else { at.discs };
+    Some((at, bound > within + beyond / placed.scale() * (1.0 + 1e-9)))
+}
+
 /// Probes the grid at the centre of a shape and, where that does not decide, at the centres of parts of its
 /// core.
 ///
 /// `proven` selects the volumes that contain the obstacle instead of the discs and balls. Calls `each` with
-/// the points that are named where the shape may touch.
+/// the points that are named where the shape may touch. `centre` is what the grid told about the centre, if it
+/// was asked.
 #[inline(always)]
 pub(crate) fn probe<'a>(
     elements: &Elements<'a>,
     solid: &Solid<'_>,
-    proven: bool,
+    (proven, centre): (bool, Option<Clearance<'a>>),
     mut each: impl FnMut(usize) -> ControlFlow<()>,
 ) -> Probed<'a> {
     let Some(grid) = elements.clear else { return Probed::Open(None) };
@@ -54,7 +75,7 @@ pub(crate) fn probe<'a>(
         }
         _ => ControlFlow::Continue(()),
     };
-    let centre = probes.at(solid.centre);
+    let centre = centre.unwrap_or_else(|| probes.at(solid.centre));
     if probes.bound(&centre) > within + solid.half.norm() {
         return Probed::Clear;
     }

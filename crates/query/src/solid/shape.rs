@@ -166,6 +166,30 @@ impl Shape<'_> {
         }
     }
 
+    /// The centre of a ball that contains the shape, the radius about the core, and the radius of a ball about
+    /// the core, in the world. `None` for shapes of any places, and if a length is negative or NaN.
+    #[inline]
+    pub(crate) fn ball(&self) -> Option<([f64; 3], [f64; 2])> {
+        let length = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        let (centre, beyond, lengths) = match *self {
+            Self::Sphere { centre, .. } => (centre, 0.0, [0.0; 3]),
+            Self::Capsule { ends: [p, q], .. } => {
+                let [centre, along] = [1.0, -1.0].map(|sign| [0, 1, 2].map(|k| 0.5 * (p[k] + sign * q[k])));
+                (centre, length(along), [0.0; 3])
+            }
+            Self::Box { pose, half, .. } => (pose.translation(), pose.scale() * length(half), half),
+            Self::Cylinder { pose, half_height, radius, .. }
+            | Self::Cone { pose, half_height, radius, .. } => {
+                let half = [radius, half_height, 0.0];
+                (pose.translation(), pose.scale() * length(half), half)
+            }
+            Self::Triangle { .. } | Self::Hull { .. } | Self::Own { .. } => return None,
+        };
+        let rounding = self.rounding();
+        let is_proper = rounding >= 0.0 && lengths.iter().all(|&l| l >= 0.0);
+        is_proper.then_some((centre, [rounding, beyond]))
+    }
+
     /// Returns `true` if no length is negative, infinite or NaN, and all coordinates are finite.
     pub(crate) fn is_valid(&self) -> bool {
         let is_finite = |points: &[[f64; 3]]| points.iter().flatten().all(|c| c.is_finite());

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{PlaceVisitor, Siblings};
+use nearmiss_hierarchy::{Clearance, PlaceVisitor, Siblings};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::Bits;
 
@@ -17,7 +17,8 @@ use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
 use crate::solid::meeting::verified_in;
-use crate::solid::probe::{Probed, probe};
+use crate::solid::probe::{Probed, about, probe};
+use crate::solid::shape::Shape;
 
 /// Discs at which a point of the surface in the shape is looked for.
 const TRIES: usize = 8;
@@ -51,22 +52,38 @@ struct Touch<'s, 'a> {
     found: Findings,
 }
 
-/// Decides whether `solid` touches the scan.
-pub(crate) fn touch(
+/// Decides whether `shape` touches the scan.
+#[inline]
+pub(crate) fn touch_shape(
     elements: &Elements<'_>,
+    shape: &Shape<'_>,
+    working: (Level, &mut ViewScratch),
+) -> ShapeAnswer {
+    let told = about(elements, shape, elements.certifies);
+    if told.is_some_and(|(_, is_clear)| is_clear) {
+        return separated(elements, elements.of_separation(false));
+    }
+    let solid = Solid::new(shape, elements.placed.stored_to_world());
+    touch(elements, solid.as_ref(), told.map(|(at, _)| at), working)
+}
+
+fn separated(elements: &Elements<'_>, evidence: Evidence) -> ShapeAnswer {
+    ShapeAnswer { verdict: ShapeVerdict::Separated { evidence }, band: elements.greatest_band() }
+}
+
+/// Decides whether `solid` touches the scan, given what the grid told about the centre, if it was asked.
+pub(crate) fn touch<'a>(
+    elements: &Elements<'a>,
     solid: Option<&Solid<'_>>,
+    told: Option<Clearance<'a>>,
     (level, scratch): (Level, &mut ViewScratch),
 ) -> ShapeAnswer {
     let Some(solid) = solid else {
         return ShapeAnswer { verdict: ShapeVerdict::Undecided(Reason::Shape), band: f64::INFINITY };
     };
-    let separated = |evidence| ShapeAnswer {
-        verdict: ShapeVerdict::Separated { evidence },
-        band: elements.greatest_band(),
-    };
     let mut found = Findings::NONE;
-    let at = match probe(elements, solid, elements.certifies, |i| found.examine(elements, solid, i)) {
-        Probed::Clear => return separated(elements.of_separation(false)),
+    let at = match probe(elements, solid, (elements.certifies, told), |i| found.examine(elements, solid, i)) {
+        Probed::Clear => return separated(elements, elements.of_separation(false)),
         Probed::Ended => return found.answer(elements, solid, scratch),
         Probed::Open(at) => at,
     };
@@ -149,12 +166,11 @@ impl Findings {
             }
             return touching(first, elements.in_world(&first.point), Evidence::Estimated);
         }
-        let verdict = if self.undersampled {
-            ShapeVerdict::Undecided(Reason::Undersampled)
-        } else {
-            ShapeVerdict::Separated { evidence: elements.of_separation(self.doubtful) }
-        };
-        ShapeAnswer { verdict, band: elements.greatest_band() }
+        if self.undersampled {
+            let verdict = ShapeVerdict::Undecided(Reason::Undersampled);
+            return ShapeAnswer { verdict, band: elements.greatest_band() };
+        }
+        separated(elements, elements.of_separation(self.doubtful))
     }
 }
 
@@ -201,5 +217,72 @@ impl PlaceVisitor for Touch<'_, '_> {
             }
         }
         ControlFlow::Continue(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_geometry::{PointCloud, Pose};
+    use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
+    use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
+    use rand::RngExt;
+
+    use super::*;
+    use crate::ask::options::CollideOptions;
+    use crate::pair::placed::Placed;
+    use crate::pair::shape_index::ShapeIndex;
+    use crate::solid::plan::ShapePlan;
+
+    #[test]
+    fn balls_about_shapes_answer_as_their_cores() {
+        let cloud = PointCloud::from_positions(dragon_mesh(Dragon::Points5k).unwrap().vertices()).unwrap();
+        let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let index = ShapeIndex::new(&scan);
+        let (r, level, scratch) = (scan.sampling_radius(), Level::new(), &mut ViewScratch::default());
+        let rng = &mut rng(17);
+        let (mut clear, mut met) = ([0; 5], [0; 5]);
+        for round in 0..4000 {
+            let options =
+                if round % 2 == 0 { CollideOptions::default() } else { CollideOptions::estimated() };
+            let plan = ShapePlan::new(&options.with_margin([0.0, 0.0, 0.5 * r][round % 3]), &scan).unwrap();
+            let pose = rotation(rng).with_scale([1.0, 0.1, 3.0][round % 3]);
+            let elements = Elements::new(Placed::new(&scan, &pose).with_shapes(&index), &plan);
+            let (size, away) = (rng.random_range(0.1..2.0) * r * pose.scale(), 6.0 * r * pose.scale());
+            let off = point_in(rng, away);
+            let at = pose.apply(scan.arrays().position(rng.random_range(0..scan.len())).map(f64::from));
+            let (centre, along) = ([0, 1, 2].map(|k| at[k] + off[k]), unit_vector(rng));
+            let [low, high] = [-2.0, 2.0].map(|s| [0, 1, 2].map(|k| centre[k] + s * size * along[k]));
+            let body = rotation(rng).with_translation(centre).with_scale(0.5);
+            let shape = match round % 5 {
+                0 => Shape::Sphere { centre, radius: size },
+                1 => Shape::Capsule { ends: [low, high], radius: 0.5 * size },
+                2 => Shape::Box { pose: body, half: [4.0, 2.0, 1.0].map(|h| h * size), radius: 0.2 * size },
+                3 => Shape::Cylinder { pose: body, half_height: 3.0 * size, radius: size, rounding: 0.0 },
+                _ => Shape::Cone { pose: body, half_height: 3.0 * size, radius: size, rounding: 0.1 * size },
+            };
+            let (_, [radius, beyond]) = shape.ball().unwrap();
+            let solid = Solid::new(&shape, elements.placed.stored_to_world()).unwrap();
+            let least = solid.radius + solid.half.max();
+            assert!((radius + beyond) / pose.scale() >= least * (1.0 - 1e-12), "round {round}: {shape:?}");
+            let found = touch_shape(&elements, &shape, (level, &mut *scratch));
+            let expected = touch(&elements, Some(&solid), None, (level, &mut *scratch));
+            assert_eq!(found, expected, "round {round}: {shape:?}");
+            let told = about(&elements, &shape, elements.certifies);
+            clear[round % 5] += usize::from(told.is_some_and(|(_, is_clear)| is_clear));
+            met[round % 5] += usize::from(found.verdict.is_touching());
+        }
+        assert!(clear.iter().chain(&met).all(|&count| count > 60), "{clear:?} clear, {met:?} touch");
+        for shape in [
+            Shape::Sphere { centre: [f64::NAN, 0.0, 0.0], radius: 1.0 },
+            Shape::Sphere { centre: [9e9; 3], radius: -1.0 },
+            Shape::Capsule { ends: [[9e9; 3], [f64::INFINITY; 3]], radius: 0.0 },
+            Shape::Box { pose: Pose::from_translation([9e9; 3]), half: [1.0, f64::NAN, 1.0], radius: 0.0 },
+        ] {
+            let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+            let elements = Elements::new(Placed::new(&scan, &Pose::IDENTITY).with_shapes(&index), &plan);
+            let found = touch_shape(&elements, &shape, (level, &mut *scratch));
+            assert_eq!(found.verdict, ShapeVerdict::Undecided(Reason::Shape), "{shape:?}");
+        }
     }
 }
