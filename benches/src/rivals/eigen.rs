@@ -101,7 +101,8 @@ impl Contender for Batch {
     }
 }
 
-/// All solvers, ours first; faer with the feature `faer`. The batch solver occurs once for each instruction set of this machine.
+/// All solvers, ours first; faer with the feature `faer`. The batch solver occurs once for each instruction
+/// set of this machine.
 #[must_use]
 pub fn contenders() -> Vec<Box<dyn Contender>> {
     let mut all: Vec<Box<dyn Contender>> = vec![one_by_one("single", |m| m, |m| symmetric_eigen(*m), all_of)];

@@ -81,9 +81,6 @@ pub struct SweepArgs {
 }
 
 pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
-    if let Some(which) = args.as_mesh {
-        which.refuse(&[("--image", args.image.is_some())])?;
-    }
     let console = Console::new(args.quiet);
     let inputs = args.pair.inputs();
     if let Some(path) = &args.image {
@@ -109,7 +106,7 @@ pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
     drop(bar);
-    if let (Some(path), Bodies::Scans([a, b])) = (&args.image, &bodies) {
+    if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let style = scans_picture::Style {
             names: scans_picture::names(inputs),
@@ -117,8 +114,15 @@ pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
             view: args.view,
             unit: args.pair.world_unit(),
         };
-        let moving = [a.along(&motions[0]), b.along(&motions[1])];
-        output::save_picture(&picture::paint(moving, &plan, &answer, &style), path)?;
+        let of_mesh;
+        let shown = match &bodies {
+            Bodies::Scans([a, b]) => [a, b],
+            Bodies::MeshAndScan { mesh, scan, mesh_is_a } => {
+                of_mesh = picture::points_of(mesh, inputs[usize::from(!mesh_is_a)])?;
+                if *mesh_is_a { [&of_mesh, scan] } else { [scan, &of_mesh] }
+            }
+        };
+        output::save_picture(&picture::paint((&bodies, shown, &motions), &plan, &answer, &style), path)?;
         drop(bar);
     }
     let mut results = Results::new();

@@ -2,8 +2,9 @@
 //! of each. Frames of a depth camera that replace each other.
 //!
 //! Methods are compared frame by frame, so each finds what the others left in the caches. Rows that say
-//! "alone" are of a program that follows the same frames by one method, with the same questions about each. It
-//! writes each frame just before, as a simulation or a camera does; the other rows read it from where all are kept.
+//! "alone" are of a program that follows the same frames by one method, with the same questions about each.
+//! It writes each frame just before, as a simulation or a camera does; the other rows read it from where all
+//! are kept.
 //!
 //! The frames of a mesh are files. A scan of it has points that are spread over the surface of the
 //! first frame and move with their triangles. Two copies are asked in every frame, at the same poses

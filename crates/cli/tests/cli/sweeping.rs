@@ -2,6 +2,7 @@
 
 use nearmiss_testdata::shapes::sphere;
 
+use crate::meshes::cubes;
 use crate::running::{Place, keys, numbers, sorted};
 
 /// Returns a folder with a ball of radius 1, and three paths: into another one, past it, and of one
@@ -78,6 +79,33 @@ fn a_picture_shows_the_motion_and_the_distance() {
         let (width, pixels) = place.picture("sweep.png");
         let painted = pixels.chunks(3).filter(|p| p.iter().any(|&c| c < 200)).count();
         assert!(width > 1000 && painted > 5000, "{path}: {painted} pixels");
+    }
+}
+
+#[test]
+fn a_picture_shows_a_mesh_as_a_scan_of_it() {
+    let place = cubes();
+    place.cloud("ball.xyz", sphere(1.0), 0.08);
+    place.write("past.txt", "6 0 0 0 0 0 1\n0 4 0 0 0 0 1\n");
+    place.ok(&["sample", "cube.obj", "-o", "cube.ply", "--spacing", "0.08", "--quiet"]);
+    let painted = |[a, b]: [&str; 2], as_mesh: &[&str]| {
+        let args = ["--path", "past.txt", "--view", "40,30", "--image", "sweep.png"];
+        place.ok(&[&["sweep", a, b][..], as_mesh, &args].concat());
+        let (width, pixels) = place.picture("sweep.png");
+        // The middle of the left half: the motion.
+        let rows: Vec<&[u8]> = pixels.chunks(3 * width).skip(100).take(width / 2 - 200).collect();
+        let part = |row: &&[u8]| row[300..3 * (width / 2 - 100)].to_vec();
+        rows.iter().flat_map(part).collect::<Vec<u8>>()
+    };
+    for (which, order) in [("a", [0, 1]), ("b", [1, 0])] {
+        let ordered = |cube| order.map(|k| [cube, "ball.xyz"][k]);
+        let scan = painted(ordered("cube.ply"), &[]);
+        let mesh = painted(ordered("cube.obj"), &["--as-mesh", which]);
+        let is_ground = |pixel: &[u8]| pixel.iter().all(|&c| c > 225);
+        let things = scan.chunks(3).filter(|pixel| !is_ground(pixel)).count();
+        let pairs = scan.chunks(3).zip(mesh.chunks(3));
+        let differ = pairs.filter(|(p, q)| is_ground(p) != is_ground(q)).count();
+        assert!(things > 20_000 && differ < things / 20, "{which}: {differ} of {things} pixels differ");
     }
 }
 

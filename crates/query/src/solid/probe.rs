@@ -57,8 +57,8 @@ pub(crate) fn about<'a>(
 /// core.
 ///
 /// `proven` selects the volumes that contain the obstacle instead of the discs and balls. Calls `each` with
-/// the points that are named where the shape may touch. `centre` is what the grid told about the centre, if it
-/// was asked.
+/// the points that are named where the shape may touch. `centre` is what the grid told about the centre, if
+/// it was asked.
 #[inline(always)]
 pub(crate) fn probe<'a>(
     elements: &Elements<'a>,

@@ -166,8 +166,8 @@ impl Shape<'_> {
         }
     }
 
-    /// The centre of a ball that contains the shape, the radius about the core, and the radius of a ball about
-    /// the core, in the world. `None` for shapes of any places, and if a length is negative or NaN.
+    /// The centre of a ball that contains the shape, the radius about the core, and the radius of a ball
+    /// about the core, in the world. `None` for shapes of any places, and if a length is negative or NaN.
     #[inline]
     pub(crate) fn ball(&self) -> Option<([f64; 3], [f64; 2])> {
         let length = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
