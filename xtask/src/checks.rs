@@ -69,8 +69,7 @@ fn beside(name: &str) -> Outcome<Command> {
 fn verify() -> Outcome {
     // Together with the command line, since they then have the features of this program and share its
     // libraries.
-    let packages =
-        ["-p", "nearmiss-benches", "-p", "check-proof", "-p", "nearmiss-cli", "--no-default-features"];
+    let packages = ["-p", "nearmiss-benches", "-p", "check-proof", "-p", "nearmiss-cli"];
     let programs = ["--bin", "verify", "--bin", "check-proof"];
     run_cargo(&[&["build", "--release", "--quiet"][..], &packages, &programs].concat())?;
     run(beside("verify")?.arg("--quick"), "verify")?;

@@ -61,13 +61,15 @@ pub(crate) fn touch_shape(
 ) -> ShapeAnswer {
     let told = about(elements, shape, elements.certifies);
     if told.is_some_and(|(_, is_clear)| is_clear) {
-        return separated(elements, elements.of_separation(false));
+        return separated(elements, false);
     }
     let solid = Solid::new(shape, elements.placed.stored_to_world());
     touch(elements, solid.as_ref(), told.map(|(at, _)| at), working)
 }
 
-fn separated(elements: &Elements<'_>, evidence: Evidence) -> ShapeAnswer {
+/// The answer about a shape that touches nothing, near which enclosures may be if `is_doubtful`.
+fn separated(elements: &Elements<'_>, is_doubtful: bool) -> ShapeAnswer {
+    let evidence = elements.of_separation(is_doubtful);
     ShapeAnswer { verdict: ShapeVerdict::Separated { evidence }, band: elements.greatest_band() }
 }
 
@@ -83,7 +85,7 @@ pub(crate) fn touch<'a>(
     };
     let mut found = Findings::NONE;
     let at = match probe(elements, solid, (elements.certifies, told), |i| found.examine(elements, solid, i)) {
-        Probed::Clear => return separated(elements, elements.of_separation(false)),
+        Probed::Clear => return separated(elements, false),
         Probed::Ended => return found.answer(elements, solid, scratch),
         Probed::Open(at) => at,
     };
@@ -170,7 +172,7 @@ impl Findings {
             let verdict = ShapeVerdict::Undecided(Reason::Undersampled);
             return ShapeAnswer { verdict, band: elements.greatest_band() };
         }
-        separated(elements, elements.of_separation(self.doubtful))
+        separated(elements, self.doubtful)
     }
 }
 
