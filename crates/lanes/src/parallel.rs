@@ -124,22 +124,31 @@ pub fn in_order<S: Send, R: Send>(
     last.into_iter().for_each(take);
 }
 
-/// Writes the items that `f` returns for consecutive ranges of `0..count` into `out`, one after the
-/// other. For expensive `f`, with scratch memory as [`map_with`] has it.
-///
-/// # Panics
-/// If `f` returns more items in all than `out` has.
-pub fn collect_into<S: Send, T: Copy + Send>(
+/// Passes consecutive ranges of items, of which `out` has `each` elements for one, with these elements to
+/// `f`, which fills them in place; the last item may have fewer. For expensive `f`, with scratch memory as
+/// [`map_with`] has it.
+pub fn fill_with<S: Send, T: Send>(
     out: &mut [T],
-    count: usize,
+    each: usize,
     scratch: impl Fn() -> S + Sync + Send,
-    f: impl Fn(&mut S, Range<usize>) -> Vec<T> + Sync + Send,
+    f: impl Fn(&mut S, Range<usize>, &mut [T]) + Sync + Send,
 ) {
-    let mut next = 0;
-    in_order(count, scratch, f, |some| {
-        out[next..next + some.len()].copy_from_slice(&some);
-        next += some.len();
-    });
+    let count = out.len().div_ceil(each);
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        // Few items at once if there are not many, so that threads finish at nearly the same time.
+        let length = (count / (4 * PIECES)).clamp(1, 16);
+        let (most, pool) = (count.div_ceil(length * PIECES).max(1), Mutex::new(Vec::new()));
+        let lend = || Lent { scratch: taken(&pool), pool: &pool };
+        let runs = out.par_chunks_mut(length * each).with_max_len(most).enumerate();
+        runs.for_each_init(lend, |lent, (run, part)| {
+            let items = run * length..((run + 1) * length).min(count);
+            f(lent.scratch.get_or_insert_with(&scratch), items, part);
+        });
+    }
+    #[cfg(not(feature = "rayon"))]
+    f(&mut scratch(), 0..count, out);
 }
 
 /// Sets every item of `out` to `f` of its index. For cheap `f`: a thread takes many items at once.
@@ -387,10 +396,21 @@ mod tests {
             },
         );
         assert_eq!(next, count);
-        let mut out = vec![0; 100];
-        collect_into(&mut out, 50, || (), |(), range| range.flat_map(|i| [2 * i, 2 * i + 1]).collect());
-        assert_eq!(out, (0..100).collect::<Vec<_>>());
         in_order(0, || (), |(), _| (), |()| unreachable!("there is nothing to do"));
+    }
+
+    #[test]
+    fn each_range_fills_the_elements_of_its_items() {
+        for len in [0, 1, 2, 99, 100, 3001] {
+            let mut out = vec![0; len];
+            fill_with(&mut out, 3, Vec::new, |scratch, items, part| {
+                scratch.clear();
+                scratch.extend(items.flat_map(|i| [3 * i, 3 * i + 1, 3 * i + 2]));
+                assert!(scratch.len() - part.len() < 3, "only the last item may have fewer elements");
+                part.copy_from_slice(&scratch[..part.len()]);
+            });
+            assert_eq!(out, (0..len).collect::<Vec<_>>());
+        }
     }
 
     #[test]

@@ -14,7 +14,7 @@ const WIDTH: usize = PointBlock::WIDTH;
 pub(crate) const HALF: usize = WIDTH / 2;
 
 /// Bound on the relative rounding error of a comparison of distances.
-const GROWN: f32 = 1.0 + 1e-5;
+pub(crate) const GROWN: f32 = 1.0 + 1e-5;
 
 /// Bound on the rounding error of a position and of a distance from it, relative to the greatest
 /// coordinate of the position.
@@ -73,8 +73,7 @@ impl Gathered {
             let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
             let far = (support_radius + slack) * GROWN;
             let lanes = bits(d_sq.simd_le(far * far));
-            let decay = f32x16::splat(simd, plan.reach_sq()) / (support_radius * support_radius);
-            let (low, high) = simd.split_f32x16(decay);
+            let (low, high) = simd.split_f32x16(plan.decays(simd, block));
             // No branch depends on the outcome, which is unpredictable.
             for (half, decay) in [low, high].into_iter().enumerate() {
                 if let Some(row) = rows.get_mut(count) {

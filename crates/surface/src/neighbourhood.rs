@@ -8,7 +8,7 @@ use fearless_simd::{
 
 use nearmiss_index::PointBlock;
 
-use crate::gathered::{Gathered, HALF, half_of};
+use crate::gathered::{GROWN, Gathered, HALF, half_of};
 use crate::{Kernel, SurfacePlan};
 
 /// Weighted sums over a neighbourhood, relative to the point x for which they were taken.
@@ -174,15 +174,18 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// Adds the points of a block that have x within their support radius.
     #[inline(always)]
     pub fn offer(&mut self, simd: S, block: &PointBlock) {
-        let (t, _) = self.distances(simd, block);
+        let (t, _) = self.distances(simd, block, self.plan.decays(simd, block));
         let (low, high) = simd.split_f32x16(t);
         let (low, high) = (self.weights(simd, low), self.weights(simd, high));
         self.add_half(simd, block, 0, low);
         self.add_half(simd, block, 1, high);
     }
 
-    /// Adds the blocks with indices `supporting`, ascending, as [`Self::offer`] does. `halves` is
-    /// scratch memory; its contents afterwards are unspecified.
+    /// Adds the blocks with indices `supporting`, ascending, as [`Self::offer`] does. Moves the indices of
+    /// those with a point that has x within its support radius to the front, and returns their number; by
+    /// rounding, others may be among them. `decays` has the [decays](SurfacePlan::decays) of each block. If
+    /// it is empty they are computed here, by a division that takes a third of the time. `halves` is scratch
+    /// memory; its contents afterwards are unspecified.
     ///
     /// Computes first the distances for all blocks, then the weights, then the sums. This avoids an
     /// unpredictable branch on whether a half block contributes: of the blocks near x about every
@@ -192,25 +195,33 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     pub fn offer_all(
         &mut self,
         simd: S,
-        blocks: &[PointBlock],
-        supporting: &[u32],
+        (blocks, decays): (&[PointBlock], &[[f32; WIDTH]]),
+        supporting: &mut [u32],
         halves: &mut Vec<HalfBlock>,
-    ) {
+    ) -> usize {
         let most = 2 * supporting.len() + 1;
         if halves.len() < most {
             halves.resize(most, HalfBlock::default());
         }
-        let (halves, mut count) = (&mut halves[..most], 0);
-        for &id in supporting {
+        let (halves, mut count, mut kept) = (&mut halves[..most], 0, 0);
+        for i in 0..supporting.len() {
+            let id = supporting[i];
             if let (Some(block), Some([one, other, ..])) =
                 (blocks.get(id as usize), halves.get_mut(count..).and_then(<[_]>::first_chunk_mut::<2>))
             {
-                let (t, [any_low, any_high]) = self.distances(simd, block);
+                let decay = match decays.get(id as usize) {
+                    Some(decay) => f32x16::load_array_ref(simd, decay),
+                    None => self.plan.decays(simd, block),
+                };
+                let (t, [any_low, any_high]) = self.distances(simd, block, decay);
                 let (low, high) = simd.split_f32x16(t);
                 *one = HalfBlock { lanes: low.to_array(), id: 2 * id };
                 let next = if any_low { other } else { one };
                 *next = HalfBlock { lanes: high.to_array(), id: 2 * id + 1 };
                 count += usize::from(any_low) + usize::from(any_high);
+                let is_near: mask32x16<S> = t.simd_lt(self.plan.reach_sq() * GROWN);
+                supporting[kept] = id;
+                kept += usize::from(is_near.any_true());
             }
         }
         for half in &mut halves[..count] {
@@ -221,6 +232,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
                 self.add_half(simd, block, half.id as usize % 2, f32x8::load_array_ref(simd, &half.lanes));
             }
         }
+        kept
     }
 
     /// Adds gathered points, as [`Self::offer_all`] adds those of blocks, in the same passes.
@@ -251,10 +263,11 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     #[inline(always)]
     fn offer_measured(&mut self, simd: S, block: &MeasuredBlock) {
         let distance = f32x16::load_array_ref(simd, &block.distance);
-        let t = distance * distance * self.decay(simd, &block.points);
+        let decay = self.plan.decays(simd, &block.points);
+        let t = distance * distance * decay;
         let counts: mask32x16<S> = t.simd_lt(self.plan.reach_sq());
         let support = self.support + counts.to_bitmask().count_ones();
-        let (straight, _) = self.distances(simd, &block.points);
+        let (straight, _) = self.distances(simd, &block.points, decay);
         let straight = simd.select_f32x16(counts, straight, f32x16::simd_from(simd, f32::INFINITY));
         let (low, high) = simd.split_f32x16(straight);
         let nearest = self.nearest.min(low.min(high));
@@ -265,23 +278,16 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         (self.nearest, self.support) = (nearest, support);
     }
 
-    /// Returns 1/h² of the points of a block; infinite in unused lanes.
+    /// Returns d²/h² of the points of a block with these decays, and for each half whether any point
+    /// contributes. Counts the contributing points.
     #[inline(always)]
-    fn decay(&self, simd: S, block: &PointBlock) -> f32x16<S> {
-        let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
-        f32x16::splat(simd, self.plan.reach_sq()) / (support_radius * support_radius)
-    }
-
-    /// Returns d²/h² of the points of a block, and for each half whether any point contributes.
-    /// Counts the contributing points.
-    #[inline(always)]
-    fn distances(&mut self, simd: S, block: &PointBlock) -> (f32x16<S>, [bool; 2]) {
+    fn distances(&mut self, simd: S, block: &PointBlock, decay: f32x16<S>) -> (f32x16<S>, [bool; 2]) {
         let [px, py, pz] = &block.position;
         let (high, low) = (self.high, self.low);
         let x = (f32x16::load_array_ref(simd, px) - high[0]) - low[0];
         let y = (f32x16::load_array_ref(simd, py) - high[1]) - low[1];
         let z = (f32x16::load_array_ref(simd, pz) - high[2]) - low[2];
-        let t = (x * x + y * y + z * z) * self.decay(simd, block);
+        let t = (x * x + y * y + z * z) * decay;
         let counts: mask32x16<S> = t.simd_lt(self.plan.reach_sq());
         let bits = counts.to_bitmask();
         self.support += bits.count_ones();

@@ -1,7 +1,10 @@
 //! Options that define the surface, and the validated plan made from them.
 
-use nearmiss_index::PointBlock;
 use std::fmt;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16};
+use nearmiss_index::PointBlock;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -247,6 +250,14 @@ impl SurfacePlan {
     #[must_use]
     pub fn decay(&self, support_radius: f32) -> f32 {
         self.reach_sq / (support_radius * support_radius)
+    }
+
+    /// Returns 1/h² of the points of a block; infinite in unused lanes.
+    #[inline(always)]
+    #[must_use]
+    pub fn decays<S: Simd>(&self, simd: S, block: &PointBlock) -> f32x16<S> {
+        let support_radius = f32x16::load_array_ref(simd, &block.support_radius);
+        f32x16::splat(simd, self.reach_sq) / (support_radius * support_radius)
     }
 
     /// Returns h over the support radius.

@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{chunks, collect_into, in_order, ranges_with};
+use nearmiss_lanes::parallel::{chunks, fill_with, in_order};
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
 use nearmiss_store::{Room, WorkError, Workspace};
@@ -110,13 +110,16 @@ struct LeafScratch {
     surroundings: Surroundings,
     /// The blocks near the leaf.
     blocks: Vec<PointBlock>,
+    /// The decays of their points.
+    decays: Vec<[f32; PointBlock::WIDTH]>,
     /// The places of the blocks whose support may contain a point.
     near: Vec<u32>,
     /// The places of the blocks whose support may come within the reach of a point.
     wide: Vec<u32>,
     halves: Vec<HalfBlock>,
     fits: Vec<Moments>,
-    /// The lists `near` of all points of a leaf, one after the other, and the end of each.
+    /// The places of the blocks with points that support each point of a leaf, one after the other, and the
+    /// end of each point's.
     lists: Vec<u32>,
     ends: Vec<usize>,
 }
@@ -144,40 +147,38 @@ pub(crate) fn fits(
 ) -> Result<Room<Fit>, WorkError> {
     let (topology, level) = (index.tree.topology, Level::new());
     let mut all = work.room(positions.len())?;
-    collect_into(&mut all, topology.leaves(), LeafScratch::default, |scratch, leaves| {
-        let mut fits = Vec::with_capacity(leaves.len() * topology.leaf_size());
-        for number in leaves {
+    fill_with(&mut all, topology.leaf_size(), LeafScratch::default, |scratch, leaves, found| {
+        for (number, found) in leaves.zip(found.chunks_mut(topology.leaf_size())) {
             let points = topology.points_of_leaf(number);
             let (positions, spacings) = (&positions[points.clone()], &spacings[points]);
             let look = |i: usize| spacings[i].look();
-            dispatch!(level, simd => fit(simd, index, positions, (look, gaps), scratch, &mut fits));
+            dispatch!(level, simd => fit(simd, index, positions, (look, gaps), scratch, found));
         }
-        fits
     });
     Ok(all)
 }
 
-/// Fits the surface at the points of some leaves, in order, with their gaps. `looks` has their appearance.
+/// Fits the surface at the points of some leaves, ascending, with their gaps. `looks` has their
+/// appearance.
 pub(crate) fn fits_of(
     index: &Index<'_>,
     positions: &[[f32; 3]],
     looks: &(impl Fn(usize) -> Look + Sync + Send),
     leaves: &[u32],
 ) -> Vec<Fit> {
-    let level = Level::new();
-    // Few leaves at once, as a thread may finish early if there are not many.
-    let some = ranges_with(leaves.len(), 4, LeafScratch::default, |scratch, some| {
-        let leaves = &leaves[some];
-        let mut fits = Vec::with_capacity(leaves.len() * index.tree.topology.leaf_size());
-        for number in leaves {
-            let points = index.tree.topology.points_of_leaf(*number as usize);
+    let (topology, level) = (index.tree.topology, Level::new());
+    // Only the last leaf may have fewer points.
+    let count = leaves.iter().map(|&leaf| topology.points_of_leaf(leaf as usize).len()).sum();
+    let mut all = vec![Fit::default(); count];
+    fill_with(&mut all, topology.leaf_size(), LeafScratch::default, |scratch, some, found| {
+        for (number, found) in leaves[some].iter().zip(found.chunks_mut(topology.leaf_size())) {
+            let points = topology.points_of_leaf(*number as usize);
             let (first, positions) = (points.start, &positions[points]);
             let look = |i: usize| looks(first + i);
-            dispatch!(level, simd => fit(simd, index, positions, (look, true), scratch, &mut fits));
+            dispatch!(level, simd => fit(simd, index, positions, (look, true), scratch, found));
         }
-        fits
     });
-    some.into_iter().flatten().collect()
+    all
 }
 
 /// Returns the gaps of some points, in order. `normal` returns the normal of a point.
@@ -341,8 +342,8 @@ impl Leaf<'_> {
     }
 }
 
-/// Appends the fits of the points of a leaf to `found`, with gaps if `gaps`. `look` returns the appearance
-/// of a point.
+/// Sets `found` to the fits of the points of a leaf, with gaps if `gaps`. `look` returns the appearance of
+/// a point.
 #[inline(always)]
 fn fit<S: Simd>(
     simd: S,
@@ -350,12 +351,12 @@ fn fit<S: Simd>(
     positions: &[[f32; 3]],
     (look, gaps): (impl Fn(usize) -> Look, bool),
     scratch: &mut LeafScratch,
-    found: &mut Vec<Fit>,
+    found: &mut [Fit],
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            let LeafScratch { locality, blocks, near, halves, fits, lists, ends, .. } = scratch;
+            let LeafScratch { locality, blocks, decays, near, halves, fits, lists, ends, .. } = scratch;
             let middle = middle(positions);
             let own = positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
             let own = own.fold(0.0, f32::max).sqrt();
@@ -363,6 +364,8 @@ fn fit<S: Simd>(
             locality.gather_balls(index);
             blocks.clear();
             blocks.extend(locality.blocks.iter().map(|&block| index.blocks[block as usize]));
+            decays.clear();
+            decays.extend(blocks.iter().map(|block| index.plan.decays(simd, block).to_array()));
             fits.clear();
             lists.clear();
             ends.clear();
@@ -370,18 +373,15 @@ fn fit<S: Simd>(
                 let x = Centre::new(p.map(f64::from));
                 let mut sums = Neighbourhood::new(simd, index.plan, &x);
                 let near = locality.supporting(simd, x.rounded(), 0.0, near);
-                lists.extend_from_slice(near);
+                let count = sums.offer_all(simd, (blocks, decays), near, halves);
+                lists.extend_from_slice(&near[..count]);
                 ends.push(lists.len());
-                sums.offer_all(simd, blocks, near, halves);
                 fits.push(sums.moments(simd));
             }
-            let first = found.len();
-            Moments::evaluate_all(simd, index.plan, positions, fits, |i, at| {
-                found.push(fitted(&at, look(i)));
-            });
+            Moments::evaluate_all(simd, index.plan, positions, fits, |i, at| found[i] = fitted(&at, look(i)));
             if gaps {
                 let mut start = 0;
-                for (i, fit) in found[first..].iter_mut().enumerate() {
+                for (i, fit) in found.iter_mut().enumerate() {
                     let near = lists[start..ends[i]].iter().map(|&place| &blocks[place as usize]);
                     let gap = widest_gap(simd, positions[i], fit.normal, near);
                     fit.code |= (gap + 1) << GAP;

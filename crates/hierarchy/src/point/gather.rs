@@ -163,7 +163,7 @@ impl<'a> Index<'a> {
             #[inline(always)]
             || {
                 let mut near = Neighbourhood::new(simd, self.plan, &centre);
-                near.offer_all(simd, self.blocks, &supporting[..count], halves);
+                near.offer_all(simd, (self.blocks, &[]), &mut supporting[..count], halves);
                 near.moments(simd).evaluate(self.plan, x)
             },
         ))

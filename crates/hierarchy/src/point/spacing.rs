@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_index::{BlockTree, Nearest, PointBlock};
-use nearmiss_lanes::parallel::{change_both, collect_into, in_order, ranges_with};
+use nearmiss_lanes::parallel::{change_both, fill_with, in_order, ranges_with};
 use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::symmetric_eigen;
 
@@ -91,14 +91,14 @@ pub(crate) fn spacings(
     let spacings: &mut [Spacing] = &mut room;
     let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(points.len());
     let search = || Search::new(tree, points);
-    collect_into(spacings, tree.blocks().len(), search, |search, blocks| {
-        let mut spacings = Vec::with_capacity(blocks.len() * WIDTH);
-        for block in blocks {
+    fill_with(spacings, WIDTH, search, |search, blocks, spacings| {
+        for (block, spacings) in blocks.zip(spacings.chunks_mut(WIDTH)) {
             search.start(block);
             let plain = search.plain(neighbours);
-            spacings.extend(of_block(block).map(|i| search.spacing(i, neighbours, plain)));
+            for (spacing, i) in spacings.iter_mut().zip(of_block(block)) {
+                *spacing = search.spacing(i, neighbours, plain);
+            }
         }
-        spacings
     });
     if spacings.iter().all(|s| s.look() == Look::Area) {
         return Ok(room);
@@ -396,25 +396,22 @@ pub(crate) fn smooth(
     let mut tips = work.room(tree.blocks().len())?;
     let (cones, level) = (tree.cones(&mut tips, tip, GROWTH), Level::new());
     let mut radii = work.room(spacings.len())?;
-    collect_into(
+    fill_with(
         &mut radii,
-        tree.blocks().len(),
+        WIDTH,
         || (),
-        |(), blocks| {
-            let mut radii = Vec::with_capacity(blocks.len() * WIDTH);
-            for block in blocks {
-                let first = block * WIDTH;
-                let own = &spacings[first..(first + WIDTH).min(spacings.len())];
+        |(), blocks, radii| {
+            for (block, radii) in blocks.zip(radii.chunks_mut(WIDTH)) {
+                let own = &spacings[block * WIDTH..][..radii.len()];
                 let mut heights = [0.0; WIDTH];
                 for (height, own) in heights.iter_mut().zip(own) {
                     *height = if own.look() == Look::Bend { f32::MAX } else { own.radius };
                 }
                 let lowest = cones.below(level, block, &heights);
-                let radius =
-                    |(own, lowest): (&Spacing, f32)| if lowest < f32::MAX { lowest } else { own.radius };
-                radii.extend(own.iter().zip(lowest).map(radius));
+                for ((radius, own), lowest) in radii.iter_mut().zip(own).zip(lowest) {
+                    *radius = if lowest < f32::MAX { lowest } else { own.radius };
+                }
             }
-            radii
         },
     );
     Ok(radii)

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 
 use nearmiss_geometry::{Aabb, Frame, PointCloud};
-use nearmiss_lanes::parallel::{fill, in_pool_awake, map_all, on_threads};
+use nearmiss_lanes::parallel::{in_pool_awake, map_all, on_threads};
 use nearmiss_store::Workspace;
 use nearmiss_surface::Metric;
 
@@ -147,8 +147,7 @@ impl DeformingScan {
     fn renew_here(&mut self, points: &[[f64; 3]]) -> Result<(), DeformError> {
         let (frame, bounds) = self.check(points)?;
         let source = self.scan.source();
-        let mut positions = vec![[0.0; 3]; source.len()];
-        fill(&mut positions, |i| frame.to_local(points[source[i] as usize]));
+        let positions = map_all(source, |i| frame.to_local(points[*i as usize]));
         let (unit, dense) = (1.0 / frame.scale, self.scan.meta.dense as usize);
         let ordered = Ordered::kept((positions.into(), source.to_vec().into()), dense, &self.options, unit)?;
         let step = step(&frame, &bounds);

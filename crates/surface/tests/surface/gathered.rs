@@ -1,4 +1,4 @@
-//! Gathered points, compared with all blocks.
+//! Gathered points and lists of blocks, compared with all blocks.
 
 use fearless_simd::dispatch;
 use nearmiss_index::PointBlock;
@@ -7,6 +7,17 @@ use nearmiss_surface::{
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
+
+/// Returns the indices of the blocks with a point that has `x` within its support radius.
+fn supporting(blocks: &[PointBlock], x: [f64; 3]) -> Vec<u32> {
+    let supports = |block: &PointBlock| {
+        (0..PointBlock::WIDTH).any(|i| {
+            let d_sq: f64 = (0..3).map(|k| (f64::from(block.position[k][i]) - x[k]).powi(2)).sum();
+            d_sq < f64::from(block.support_radius[i]).powi(2)
+        })
+    };
+    (0..).zip(blocks).filter(|(_, block)| supports(block)).map(|(i, _)| i).collect()
+}
 
 /// Compares f at places up to `distance` from `place`, in these `directions`.
 fn compare(
@@ -29,6 +40,18 @@ fn compare(
             });
             let expected = Moments::about(level, plan, x, blocks.iter().copied()).evaluate(plan, x);
             assert_eq!(found, expected, "at {x:?}, {distance} about {place:?}, {level:?}");
+            let decays: Vec<_> =
+                blocks.iter().map(|block| block.support_radius.map(|radius| plan.decay(radius))).collect();
+            for decays in [&decays[..], &[]] {
+                let mut near = all.clone();
+                let (found, count) = dispatch!(level, simd => {
+                    let mut sums = Neighbourhood::new(simd, plan, &Centre::new(x));
+                    let count = sums.offer_all(simd, (blocks, decays), &mut near, &mut Vec::new());
+                    (sums.moments(simd).evaluate(plan, x), count)
+                });
+                assert_eq!(found, expected, "at {x:?}, {level:?}");
+                assert_eq!(near[..count], supporting(blocks, x), "at {x:?}, {level:?}");
+            }
         }
     }
 }
