@@ -82,6 +82,11 @@ const MOST_TIMES: f64 = 1e9;
 const OFTEN: f64 = 8.0;
 
 pub(crate) fn run(args: &AnimateArgs) -> Result<(), CliError> {
+    // All of it on a thread of the pool, so that each move wakes only the others.
+    pool(args.threads.unwrap_or(0))?.install(|| run_here(args))
+}
+
+fn run_here(args: &AnimateArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let inputs: Vec<&Path> =
         args.frames.iter().chain(&args.against).chain(&args.against_frames).map(PathBuf::as_path).collect();
@@ -207,7 +212,6 @@ impl<'a> Told<'a> {
         following: Following,
         times: impl Iterator<Item = f64>,
     ) -> Result<(), CliError> {
-        let pool = pool(self.args.threads.unwrap_or(0))?;
         let mut body = Body::first(frames)?;
         let mut other = partner.frames().map(Body::first).transpose()?;
         let (mut asking, mut vertices) = (Asking::default(), Vec::new());
@@ -217,7 +221,7 @@ impl<'a> Told<'a> {
                 let (Some(body), Some(frames)) = (body, frames) else { continue };
                 frames.at(t, &mut vertices);
                 let start = now();
-                let renewal = pool.install(|| body.move_to(&vertices, following));
+                let renewal = body.move_to(&vertices, following);
                 let renewal = renewal.map_err(|cause| frames.fault(t, &cause))?;
                 update_micros += micros_since(start);
                 bv_updates += body.nodes() as u64;

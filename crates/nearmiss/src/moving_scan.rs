@@ -43,6 +43,9 @@ const MOST_FITTED: f64 = 0.5;
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// A move runs on the threads of the current rayon pool. Called from one of these, it wakes only the others:
+/// see the guide to moving scans.
 #[derive(Debug, Clone)]
 pub struct MovingScan {
     scan: DeformingScan,

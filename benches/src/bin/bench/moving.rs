@@ -4,7 +4,7 @@
 //! Methods are compared frame by frame, so each finds what the others left in the caches. Rows that say
 //! "alone" are of a program that follows the same frames by one method, with the same questions about each.
 //! It writes each frame just before, as a simulation or a camera does; the other rows read it from where all
-//! are kept.
+//! are kept. It calls from a thread of the pool, unless the row says otherwise.
 //!
 //! The frames of a mesh are files. A scan of it has points that are spread over the surface of the
 //! first frame and move with their triangles. Two copies are asked in every frame, at the same poses
@@ -13,7 +13,6 @@
 mod depth;
 mod measured;
 
-use std::cell::RefCell;
 use std::hint::black_box;
 use std::path::PathBuf;
 
@@ -268,24 +267,13 @@ fn scans(options: &Options, frames: &Frames, triangles: &[[u32; 3]]) -> Result<(
     heading(&format!("a scan of {} points", refitted.len()));
     let names = ["refit", "renew", "prepare anew", "ask, refitted", "ask, renewed", "ask, prepared anew"];
     times.into_iter().zip(names).for_each(|(times, name)| times.row(name));
-    for (name, by_refits) in [("refit, alone", true), ("renew, alone", false)] {
-        let scan = RefCell::new(MovingScan::new(&frames[0], &built)?);
-        let follow = |frame: &[[f64; 3]]| {
-            let mut scan = scan.borrow_mut();
-            if by_refits {
-                scan.refit(frame).map(drop)?
-            } else {
-                scan.renew(frame)?
-            }
-            Ok(())
-        };
-        let ask = |_: &_| {
-            let scan = scan.borrow();
-            let about = about(&poses, scan.bounds().centre());
-            about.iter().try_for_each(|pose| ask(&scan, pose, &mut Times::default()).map(drop))
-        };
-        alone(name, &frames, follow, ask)?;
-    }
+    let first = MovingScan::new(&frames[0], &built)?;
+    let mut ask = |scan: &MovingScan, _: &_| {
+        let about = about(&poses, scan.bounds().centre());
+        about.iter().try_for_each(|pose| ask(scan, pose, &mut Times::default()).map(drop))
+    };
+    alone("refit, alone", &frames, &first, |scan, frame| Ok(scan.refit(frame).map(drop)?), &mut ask)?;
+    alone("renew, alone", &frames, &first, |scan, frame| Ok(scan.renew(frame)?), &mut ask)?;
     let Totals { differ, beyond, proven, apart, fitted, most, loosest } = totals;
     println!(
         "\n{differ:?} of {} verdicts of refitted and renewed scans differ from those prepared anew, {beyond:?} beyond the \

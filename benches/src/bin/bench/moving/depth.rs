@@ -1,6 +1,5 @@
 //! Frames of a depth camera that replace each other.
 
-use std::cell::RefCell;
 use std::hint::black_box;
 
 use nearmiss::{
@@ -129,28 +128,17 @@ fn depth_frames_alone(
 ) -> Result<(), Failure> {
     let asked = CollideOptions::default().with_evidence(Evidence::Certified);
     let mut scratch = Scratch::default();
-    for (name, by_pixels) in [("replaced by pixels, alone", true), ("replaced by points, alone", false)] {
-        let scan = RefCell::new(MovingScan::new(first, &BuildOptions::default())?);
-        let follow = |frame: &[[f64; 3]]| {
-            let mut scan = scan.borrow_mut();
-            if by_pixels {
-                scan.replace_organised(frame, width)?
-            } else {
-                scan.replace(frame)?
-            }
-            Ok(())
-        };
-        let ask = |frame: &[[f64; 3]]| {
-            let scan = scan.borrow();
-            let plan = CollidePlan::new(&asked, &scan, tool)?;
-            let step = frame.len() / poses.max(1) as usize;
-            for seen in frame.iter().step_by(step.max(1)).filter(|seen| seen[2].is_finite()) {
-                let tool = tool.at(&Pose::from_translation([seen[0], seen[1], seen[2] - 0.2]));
-                black_box(Pair::new(scan.at(&Pose::IDENTITY), tool).collide(&plan, &mut scratch));
-            }
-            Ok(())
-        };
-        alone(name, frames, follow, ask)?;
-    }
-    Ok(())
+    let scan = MovingScan::new(first, &BuildOptions::default())?;
+    let mut ask = |scan: &MovingScan, frame: &[[f64; 3]]| {
+        let plan = CollidePlan::new(&asked, scan, tool)?;
+        let step = frame.len() / poses.max(1) as usize;
+        for seen in frame.iter().step_by(step.max(1)).filter(|seen| seen[2].is_finite()) {
+            let tool = tool.at(&Pose::from_translation([seen[0], seen[1], seen[2] - 0.2]));
+            black_box(Pair::new(scan.at(&Pose::IDENTITY), tool).collide(&plan, &mut scratch));
+        }
+        Ok(())
+    };
+    let by_pixels = |scan: &mut MovingScan, frame: &[_]| Ok(scan.replace_organised(frame, width)?);
+    alone("replaced by pixels, alone", frames, &scan, by_pixels, &mut ask)?;
+    alone("replaced by points, alone", frames, &scan, |scan, frame| Ok(scan.replace(frame)?), &mut ask)
 }

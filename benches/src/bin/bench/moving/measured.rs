@@ -1,6 +1,6 @@
 //! Times and counts of methods that follow frames.
 
-use nearmiss::{Evidence, Verdict};
+use nearmiss::{Evidence, MovingScan, Verdict};
 use nearmiss_benches::Failure;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::sample::count;
@@ -28,21 +28,28 @@ impl Times {
     }
 }
 
-/// Follows frames by one method alone, with questions about each frame. Each frame is written to the same
-/// memory just before, as by a simulation or a camera.
+/// Follows frames by one method alone, from `first` on, with questions about each frame. Each frame is written
+/// to the same memory just before, as by a simulation or a camera. Prints two rows: for calls from a thread of
+/// the pool, and for calls from outside of it.
 pub(crate) fn alone(
     name: &str,
     frames: &Frames,
-    mut follow: impl FnMut(&[[f64; 3]]) -> Result<(), Failure>,
-    mut ask: impl FnMut(&[[f64; 3]]) -> Result<(), Failure>,
+    first: &MovingScan,
+    follow: impl Fn(&mut MovingScan, &[[f64; 3]]) -> Result<(), Failure> + Sync,
+    mut ask: impl FnMut(&MovingScan, &[[f64; 3]]) -> Result<(), Failure> + Send,
 ) -> Result<(), Failure> {
-    let (mut times, mut now) = (Times::default(), Vec::new());
-    for frame in frames {
-        now.clone_from(frame);
-        times.of(|| follow(&now))?;
-        ask(&now)?;
-    }
-    times.row(name);
+    let mut pass = || {
+        let (mut times, mut now, mut scan) = (Times::default(), Vec::new(), first.clone());
+        for frame in frames {
+            now.clone_from(frame);
+            times.of(|| follow(&mut scan, &now))?;
+            ask(&scan, &now)?;
+        }
+        Ok::<_, Failure>(times)
+    };
+    // Messages, as errors of any type may not pass between threads.
+    rayon::scope(|_| pass().map_err(|failure| failure.to_string()))?.row(name);
+    pass()?.row(&format!("{name}, from outside of the pool"));
     Ok(())
 }
 
