@@ -137,6 +137,8 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
     let scan = opening.open(&args.scan)?;
+    // The rays of an image are enough for an index to pay off.
+    let scan = if args.image.is_some() { scan.with_shapes() } else { scan };
     let pose = posing::of_object(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
     let mut results = Results::new();

@@ -23,6 +23,7 @@ pub(crate) mod outline;
 mod part;
 pub(crate) mod points;
 pub(crate) mod prepare;
+pub(crate) mod ray_boxes;
 pub(crate) mod refit;
 pub(crate) mod sampling;
 pub(crate) mod share;

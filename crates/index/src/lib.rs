@@ -8,4 +8,7 @@ mod tree;
 pub use block::PointBlock;
 pub use cubes::Cubes;
 pub use fearless_simd::Level;
-pub use tree::{BlockBoxes, BlockGrid, BlockTree, Cones, Nearest, Neighbour, Overlaps, Skeleton};
+pub use tree::{
+    BlockBoxes, BlockGrid, BlockTree, BoxRay, BoxTree, Cones, Nearest, Neighbour, Overlaps, RayBox,
+    RayVisitor, Skeleton,
+};

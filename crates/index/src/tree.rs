@@ -16,6 +16,7 @@ mod cones;
 mod near;
 mod nearest;
 mod overlaps;
+mod rays;
 mod skeleton;
 mod walk;
 
@@ -23,9 +24,11 @@ pub use cells::BlockGrid;
 pub use cones::Cones;
 pub use nearest::{Nearest, Neighbour};
 pub use overlaps::Overlaps;
+pub use rays::{BoxRay, BoxTree, RayBox, RayVisitor};
 pub use skeleton::Skeleton;
 
 use std::convert::Infallible;
+use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
@@ -34,6 +37,7 @@ use nearmiss_lanes::parallel::change_each;
 use nearmiss_lanes::wide::{WIDTH, greatest_of_each, lanes_of, least_of_each, squared};
 use nearmiss_store::{Room, WorkError, Workspace};
 
+use self::walk::Groups;
 use crate::block::PointBlock;
 
 /// The number of levels of groups over 2³² points.
@@ -222,11 +226,7 @@ impl BlockBoxes {
         room: impl Fn(usize) -> Result<Room<Boxes>, E>,
     ) -> Result<Self, E> {
         assert!(points < u32::MAX as usize, "expected fewer than 2^32 - 1 points, got {points}");
-        let mut levels = vec![room(blocks.len().div_ceil(WIDTH))?];
-        while let Some(below) = levels.last().filter(|level| level.len() > 1) {
-            levels.push(room(below.len().div_ceil(WIDTH))?);
-        }
-        let mut boxes = Self { points, levels };
+        let mut boxes = Self { points, levels: levels(blocks.len(), room)? };
         boxes.fill(blocks);
         Ok(boxes)
     }
@@ -236,7 +236,6 @@ impl BlockBoxes {
         let points = self.points;
         assert_eq!(blocks.len(), points.div_ceil(WIDTH), "expected the blocks of {points} points");
         let (level, last) = (Level::new(), points - blocks.len().saturating_sub(1) * WIDTH);
-        let part = |group: usize, count: usize| group * WIDTH..count.min(group * WIDTH + WIDTH);
         let (first, above) = self.levels.split_at_mut(1);
         change_each(&mut first[0], WIDTH, |group, boxes| {
             let part = part(group, blocks.len());
@@ -247,18 +246,7 @@ impl BlockBoxes {
                 || Boxes::of_blocks(simd, blocks, last),
             ));
         });
-        let mut below = &first[0];
-        for above in above {
-            let groups: &[Boxes] = below;
-            change_each(above, WIDTH, |group, boxes| {
-                let groups = &groups[part(group, groups.len())];
-                *boxes = dispatch!(level, simd => simd.vectorize(
-                    #[inline(always)]
-                    || Boxes::of_groups(simd, groups),
-                ));
-            });
-            below = above;
-        }
+        fill_above(level, &first[0], above);
     }
 
     /// Returns the tree over `blocks`, which must be the blocks that the boxes were computed from.
@@ -287,6 +275,36 @@ impl BlockBoxes {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.points == 0
+    }
+}
+
+/// Returns the boxes below a group.
+fn part(group: usize, count: usize) -> Range<usize> {
+    group * WIDTH..count.min(group * WIDTH + WIDTH)
+}
+
+/// Returns memory for the groups of all levels over `count` boxes. There is at least one level.
+fn levels<E>(count: usize, room: impl Fn(usize) -> Result<Room<Boxes>, E>) -> Result<Vec<Room<Boxes>>, E> {
+    let mut levels = vec![room(count.div_ceil(WIDTH))?];
+    while let Some(below) = levels.last().filter(|level| level.len() > 1) {
+        levels.push(room(below.len().div_ceil(WIDTH))?);
+    }
+    Ok(levels)
+}
+
+/// Computes the boxes of the levels `above` the first one.
+fn fill_above(level: Level, first: &Room<Boxes>, above: &mut [Room<Boxes>]) {
+    let mut below = first;
+    for above in above {
+        let groups: &[Boxes] = below;
+        change_each(above, WIDTH, |group, boxes| {
+            let groups = &groups[part(group, groups.len())];
+            *boxes = dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || Boxes::of_groups(simd, groups),
+            ));
+        });
+        below = above;
     }
 }
 
@@ -332,10 +350,10 @@ impl<'a> BlockTree<'a> {
         self.levels[level][id / WIDTH].get(id % WIDTH)
     }
 
-    /// Returns the number of nodes of a level.
+    /// Returns the groups of boxes.
     #[inline(always)]
-    fn nodes(&self, level: usize) -> usize {
-        if level == 0 { self.blocks.len() } else { self.levels[level - 1].len() }
+    fn groups(&self) -> Groups<'a> {
+        Groups { count: self.blocks.len(), levels: self.levels }
     }
 }
 
@@ -362,7 +380,7 @@ mod tests {
                 let tree = boxes.over(&blocks);
                 let (mut width, mut level) = (WIDTH, 0);
                 while level < tree.levels.len() {
-                    for id in 0..tree.nodes(level) {
+                    for id in 0..tree.groups().nodes(level) {
                         let range = id * width..count.min((id + 1) * width);
                         let bounds = tree.bounds(level, id);
                         for k in 0..3 {

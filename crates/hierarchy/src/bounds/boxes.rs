@@ -10,6 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_index::RayBox;
 use nearmiss_lanes::vector::{cross, dot, sub};
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +52,22 @@ impl OrientedBox {
         let half = [0, 1, 2]
             .map(|k| (0..3).map(|j| f64::from(self.axes[j][k].abs()) * f64::from(self.half[j])).sum::<f64>());
         [-1.0, 1.0].map(|sign| [0, 1, 2].map(|k| f64::from(self.centre[k]) + sign * 1.000_001 * half[k]))
+    }
+
+    /// The upright box about this one, and the slab between the two faces that are nearest to each other.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded outwards")]
+    pub(crate) fn for_rays(&self) -> RayBox {
+        let [min, max] = self.upright();
+        let thin = (0..3).min_by(|a, b| self.half[*a].total_cmp(&self.half[*b])).unwrap_or(0);
+        let normal = self.axes[thin];
+        let middle: f64 = (0..3).map(|k| f64::from(normal[k]) * f64::from(self.centre[k])).sum();
+        let half = 1.000_001 * f64::from(self.half[thin]);
+        RayBox {
+            min: min.map(|c| (c as f32).next_down()),
+            max: max.map(|c| (c as f32).next_up()),
+            normal,
+            between: [((middle - half) as f32).next_down(), ((middle + half) as f32).next_up()],
+        }
     }
 
     /// Returns the smallest box along `axes` that contains an interval on each axis, grown by the

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::spread_out;
+use nearmiss_lanes::{id32, prefetch};
 use nearmiss_surface::SurfacePlan;
 
 use crate::bounds::boxes::OrientedBox;
@@ -101,6 +101,18 @@ impl ScanArrays<'_> {
     #[must_use]
     pub fn obstacle_enclosure(&self, node: usize) -> OrientedBox {
         self.tree.enclosure(Part::Obstacle, NodeId(id32(node)))
+    }
+
+    /// Asks the processor to load a leaf.
+    ///
+    /// # Panics
+    /// If there is no such leaf.
+    #[inline(always)]
+    pub fn prefetch_leaf(&self, number: usize) {
+        for (block, first, _) in self.leaves.blocks(number) {
+            prefetch(block);
+            prefetch(&self.radii[first]);
+        }
     }
 
     /// Returns the radius of the ball that represents a point in the obstacle: half the local

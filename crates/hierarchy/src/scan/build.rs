@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::on_threads;
+use nearmiss_lanes::prefetch;
 use nearmiss_lanes::vector::dot;
 use nearmiss_store::{Array, Workspace};
 use nearmiss_surface::SurfacePlan;
@@ -318,6 +319,21 @@ impl PointHierarchy {
     #[must_use]
     pub fn id(&self, i: usize) -> PointId {
         PointId(self.arrays.source[i])
+    }
+
+    /// Asks the processor to load what is known of the `i`-th stored point.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    #[inline]
+    pub fn prefetch_point(&self, i: usize) {
+        let (arrays, lane) = (&self.arrays, i % PointBlock::WIDTH);
+        let block = &arrays.blocks[i / PointBlock::WIDTH];
+        block.position.iter().for_each(|row| prefetch(&row[lane]));
+        prefetch(&arrays.normals[i]);
+        prefetch(&arrays.radii[i]);
+        prefetch(&arrays.codes[i]);
+        prefetch(&arrays.source[i]);
     }
 
     /// Returns the leaves.

@@ -125,7 +125,7 @@ impl Cones<'_> {
         let mut search = Search { cones: self, block, about, points, lowest, limit: f32::INFINITY };
         self.offer(simd, block, &mut search);
         // The walker never breaks.
-        let _whole = tree.walk(simd, &mut search);
+        let _whole = tree.groups().walk(simd, &mut search);
         let mut heights = *heights;
         heights[..count].copy_from_slice(&search.lowest.to_array()[..count]);
         heights

@@ -76,7 +76,7 @@ impl BlockTree<'_> {
     #[inline(always)]
     fn any_by<S: Simd>(&self, simd: S, lanes: impl Lanes, skeleton: &Skeleton, radius: f64) -> bool {
         let mut any = Any { tree: self, lanes, limits: limits(skeleton, radius), ball: (skeleton, radius) };
-        self.walk(simd, &mut any).is_break()
+        self.groups().walk(simd, &mut any).is_break()
     }
 
     /// Returns `true` if a point of a block is within `radius`. Points are certainly within if
@@ -142,7 +142,9 @@ impl BlockTree<'_> {
         let best = (reach * reach, usize::MAX);
         let mut search = NearestTo { tree: self, lanes, skeleton, best, most: 0.0 };
         search.most = search.limit();
-        self.walk_near(simd, (self.levels.len() - 1, 0, u32::MAX), &mut Stack::new(), &mut search);
+        let root = (self.levels.len() - 1, 0, u32::MAX);
+        // The walker never breaks.
+        let _whole = self.groups().walk_near(simd, root, &mut Stack::new(), &mut search);
         let (distance_sq, point) = search.best;
         (point < usize::MAX).then_some((point, distance_sq))
     }
@@ -203,7 +205,7 @@ impl<L> NearestTo<'_, L> {
 
 impl<S: Simd, L: Lanes> NearWalker<S> for NearestTo<'_, L> {
     #[inline(always)]
-    fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S> {
+    fn distances_sq(&self, simd: S, _: (usize, usize), boxes: &Boxes) -> f32x16<S> {
         self.lanes.of_boxes(simd, boxes)
     }
 
@@ -213,7 +215,7 @@ impl<S: Simd, L: Lanes> NearWalker<S> for NearestTo<'_, L> {
     }
 
     #[inline(always)]
-    fn block(&mut self, simd: S, id: usize) {
+    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
         let tree = self.tree;
         let distances = self.lanes.of_points(simd, load(simd, &tree.blocks[id].position));
         let near: mask32x16<S> = distances.simd_le(self.most);
@@ -224,6 +226,7 @@ impl<S: Simd, L: Lanes> NearWalker<S> for NearestTo<'_, L> {
                 self.most = self.limit();
             }
         }
+        ControlFlow::Continue(())
     }
 }
 

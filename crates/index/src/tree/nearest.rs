@@ -1,5 +1,7 @@
 //! The nearest neighbours of the points of a block.
 
+use std::ops::ControlFlow;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, u32x16};
 use nearmiss_lanes::id32;
@@ -124,7 +126,8 @@ impl BlockTree<'_> {
         for level in 0..self.levels.len() {
             let group = below / WIDTH;
             let siblings = !(1 << (below % WIDTH));
-            self.walk_near(simd, (level, group, siblings), &mut stack, &mut search);
+            // The walker never breaks.
+            let _whole = self.groups().walk_near(simd, (level, group, siblings), &mut stack, &mut search);
             below = group;
         }
     }
@@ -132,7 +135,7 @@ impl BlockTree<'_> {
 
 impl<S: Simd> NearWalker<S> for Search<'_, S> {
     #[inline(always)]
-    fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S> {
+    fn distances_sq(&self, simd: S, _: (usize, usize), boxes: &Boxes) -> f32x16<S> {
         boxes.distances_sq(simd, &self.about)
     }
 
@@ -148,8 +151,9 @@ impl<S: Simd> NearWalker<S> for Search<'_, S> {
     }
 
     #[inline(always)]
-    fn block(&mut self, simd: S, id: usize) {
+    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
         self.offer(simd, id, false);
+        ControlFlow::Continue(())
     }
 }
 

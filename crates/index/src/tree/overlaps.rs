@@ -61,7 +61,7 @@ impl BlockTree<'_> {
             lists,
         };
         // The walker never breaks. It visits blocks in order, so the ids in each list ascend.
-        let _whole = self.walk(simd, &mut search);
+        let _whole = self.groups().walk(simd, &mut search);
     }
 
     /// Adds the points of block `id` whose balls meet those of points of `block` to the lists of

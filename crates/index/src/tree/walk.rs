@@ -1,4 +1,4 @@
-//! The two traversals of a tree: in the order of the points, and nearest first.
+//! The two traversals of a tree: in the order of the leaves, and nearest first.
 
 use std::ops::ControlFlow;
 
@@ -7,7 +7,9 @@ use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{Bits, WIDTH, bits};
 
-use super::{BlockTree, Boxes, MOST_LEVELS};
+use nearmiss_store::Room;
+
+use super::{Boxes, MOST_LEVELS};
 
 /// The callbacks of a traversal in the order of the points.
 pub(super) trait Walker<S: Simd> {
@@ -20,8 +22,8 @@ pub(super) trait Walker<S: Simd> {
 
 /// The callbacks of a traversal that takes the nearest boxes first.
 pub(super) trait NearWalker<S: Simd> {
-    /// Returns the squared distances of the boxes of a group.
-    fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S>;
+    /// Returns the squared distances of the boxes of a group, by its level and number.
+    fn distances_sq(&self, simd: S, group: (usize, usize), boxes: &Boxes) -> f32x16<S>;
 
     /// Returns the squared distance beyond which boxes are skipped.
     fn most_sq(&self) -> f32;
@@ -33,8 +35,14 @@ pub(super) trait NearWalker<S: Simd> {
         true
     }
 
-    /// Visits a block.
-    fn block(&mut self, simd: S, id: usize);
+    /// Told of a block that is visited later, unless the search ends before.
+    #[inline(always)]
+    fn foresee(&self, id: usize) {
+        let _ = id;
+    }
+
+    /// Visits a block. May end the traversal.
+    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()>;
 }
 
 /// A node to be visited.
@@ -56,7 +64,16 @@ impl Stack {
     }
 }
 
-impl BlockTree<'_> {
+/// The groups of boxes of a tree.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Groups<'a> {
+    /// The number of boxes of the first level.
+    pub(super) count: usize,
+    /// Each level holds the boxes of the groups below. The last one has one group.
+    pub(super) levels: &'a [Room<Boxes>],
+}
+
+impl Groups<'_> {
     /// Visits the wanted blocks in order, until the walker ends the traversal.
     #[inline(always)]
     pub(super) fn walk<S: Simd>(&self, simd: S, walker: &mut impl Walker<S>) -> ControlFlow<()> {
@@ -91,17 +108,20 @@ impl BlockTree<'_> {
         (level, group, lanes): (usize, usize, u32),
         Stack(stack): &mut Stack,
         walker: &mut impl NearWalker<S>,
-    ) {
+    ) -> ControlFlow<()> {
         let mut top = 0;
         let mut next = Some((level, group, lanes));
         loop {
             if let Some((level, group, lanes)) = next.take() {
-                let distances = walker.distances_sq(simd, &self.levels[level][group]);
+                let distances = walker.distances_sq(simd, (level, group), &self.levels[level][group]);
                 let near: mask32x16<S> = distances.simd_le(walker.most_sq());
                 let distances = distances.to_array();
                 let first = top;
                 for lane in Bits(bits(near) & lanes & self.filled(level, group)) {
                     let distance_sq = distances[lane];
+                    if level == 0 {
+                        walker.foresee(group * WIDTH + lane);
+                    }
                     // Insertion sort, nearest on top: there are at most sixteen.
                     let mut place = top;
                     while place > first && stack[place - 1].distance_sq < distance_sq {
@@ -113,7 +133,7 @@ impl BlockTree<'_> {
                 }
             }
             if top == 0 {
-                return;
+                return ControlFlow::Continue(());
             }
             top -= 1;
             let Open { distance_sq, level, id } = stack[top];
@@ -122,7 +142,7 @@ impl BlockTree<'_> {
                 continue;
             }
             if level == 0 {
-                walker.block(simd, id);
+                walker.block(simd, id)?;
             } else {
                 next = Some((level - 1, id, u32::MAX));
             }
@@ -133,5 +153,11 @@ impl BlockTree<'_> {
     #[inline(always)]
     fn filled(&self, level: usize, group: usize) -> u32 {
         (1 << (self.nodes(level) - group * WIDTH).min(WIDTH)) - 1
+    }
+
+    /// Returns the number of boxes of a level.
+    #[inline(always)]
+    pub(super) fn nodes(&self, level: usize) -> usize {
+        if level == 0 { self.count } else { self.levels[level - 1].len() }
     }
 }

@@ -26,7 +26,7 @@ use crate::penetration::probe::{Deep, Probe, SLACK, deep_in_solids};
 use crate::penetration::scans::{PenetrationScratch, Piece};
 use crate::penetration::search::search;
 use crate::penetration::survey::{ContactSurvey, way_out};
-use crate::solid::cast::Crossing;
+use crate::solid::crossing::Crossing;
 use crate::solid::elements::Elements;
 use crate::solid::plan::ShapePlan;
 

@@ -16,7 +16,7 @@ use crate::penetration::interior::{
 use crate::penetration::probe::{Deep, Probe, SLACK, Vector, deep_in_solids};
 use crate::penetration::search::{SearchScratch, search};
 use crate::penetration::survey::{ContactSurvey, way_out};
-use crate::solid::cast::Crossing;
+use crate::solid::crossing::Crossing;
 use crate::solid::elements::Elements;
 use crate::solid::plan::ShapePlan;
 

@@ -11,17 +11,19 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f32x4, mask32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{PlaceVisitor, PointKind, SLAB, Siblings};
+use nearmiss_hierarchy::{OrientedBox, PlaceVisitor, PointKind, Siblings};
+use nearmiss_index::{BoxRay, RayVisitor};
+use nearmiss_lanes::prefetch;
 use nearmiss_lanes::wide::{Bits, product};
 use nearmiss_surface::Status;
 
 use crate::ask::answer::Evidence;
 use crate::ask::options::{Detail, Semantics};
-use crate::leaf::disc_triangle::FlatDisc;
 use crate::pair::placed::ViewScratch;
+use crate::solid::crossing::{Crossing, enters, meets, passes_cell};
 use crate::solid::elements::{Element, Elements};
 use crate::solid::ray::{RayHit, StoredRay};
-use crate::solid::ray_lanes::LaneRay;
+use crate::solid::ray_lanes::{LEAST_SPEED, LaneRay};
 
 type Vector = Vector3<f64>;
 
@@ -36,31 +38,6 @@ const ROUNDS: u32 = 8;
 
 /// The least cosine of a ray and a normal at which the crossing is refined.
 const GRAZING: f64 = 0.02;
-
-/// A place where a ray meets the part of a point, in the stored frame.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Crossing {
-    t: f64,
-    i: usize,
-    /// The distance from the centre of the disc, in disc radii; at most 1 on the disc.
-    beside: f64,
-    /// How much the ray turns the distance from the plane into its own length; 1 for balls.
-    cosine: f64,
-}
-
-impl Crossing {
-    /// Returns `true` if the ray meets the disc or ball itself.
-    pub(crate) fn is_sure(&self) -> bool {
-        self.beside <= 1.0
-    }
-
-    /// The length of the ray in which it may meet other discs of the same sheet: through half the
-    /// thickness of the sheet, and no more than a local radius.
-    fn layer(&self, elements: &Elements<'_>) -> f64 {
-        let radius = f64::from(elements.arrays.radii[self.i]);
-        radius * (f64::from(SLAB) / self.cosine).min(1.0)
-    }
-}
 
 /// The places that a search wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,6 +60,8 @@ struct Cast<'s, 'a> {
     /// The distance from that place beyond which nothing is of interest.
     most: f32,
     most_sq: f32,
+    /// The distance from the origin beyond which no crossing belongs to the first hit.
+    end: f64,
     found: &'s mut Vec<Crossing>,
     /// `true` if the ray passes through a volume that may contain the obstacle.
     is_doubtful: bool,
@@ -124,13 +103,20 @@ pub(crate) fn crossings(
         thick,
         most: f32::INFINITY,
         most_sq: f32::INFINITY,
+        end: f64::INFINITY,
         found,
         is_doubtful: elements.of_separation(false) == Evidence::Estimated,
     };
     search.limit(ray.max);
     // Ends early if any hit will do.
-    let _ended = elements.arrays.tree.descend_to(level, from, &mut search);
+    let _ended = match elements.rays {
+        Some(rays) => rays.tree.visit_along(level, &BoxRay::new(from, along, thick), &mut search),
+        None => elements.arrays.tree.descend_to(level, from, &mut search),
+    };
     let evidence = elements.of_separation(search.is_doubtful);
+    // All crossings up to the end are known. Which others are depends on the order of the leaves.
+    let end = search.end;
+    found.retain(|crossing| crossing.t <= end);
     found.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.i.cmp(&b.i)));
     evidence
 }
@@ -327,6 +313,8 @@ impl Cast<'_, '_> {
     /// Adds a crossing. Ends the search if it is enough.
     fn note(&mut self, crossing: Crossing) -> ControlFlow<()> {
         self.found.push(crossing);
+        // The hit is one of the crossings.
+        self.elements.placed.scan().prefetch_point(crossing.i);
         if !crossing.is_sure() {
             return ControlFlow::Continue(());
         }
@@ -334,6 +322,7 @@ impl Cast<'_, '_> {
             Wanted::Any => return ControlFlow::Break(()),
             Wanted::First => {
                 let end = (crossing.t + crossing.layer(self.elements)).min(self.ray.max);
+                self.end = self.end.min(end);
                 if end < self.skipped + f64::from(self.most) {
                     self.limit(end);
                 }
@@ -344,76 +333,25 @@ impl Cast<'_, '_> {
     }
 }
 
-/// The distance at which a ray enters a ball; 0 if it starts inside.
-fn enters(ray: &StoredRay, centre: &Vector, radius: f64) -> Option<f64> {
-    let middle = (centre - ray.origin).dot(&ray.direction);
-    let off_sq = (centre - ray.at(middle)).norm_squared();
-    let half_sq = radius * radius - off_sq;
-    let half = if half_sq >= 0.0 { half_sq.sqrt() } else { return None };
-    (middle + half >= 0.0).then(|| (middle - half).max(0.0))
-}
+impl RayVisitor for Cast<'_, '_> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.most_sq
+    }
 
-/// Where a ray meets a disc, or the plane of the disc up to `cell` from its centre.
-fn meets(ray: &StoredRay, disc: &FlatDisc, i: usize, cell: f64) -> Option<Crossing> {
-    let cosine = disc.normal.dot(&ray.direction);
-    let height = disc.normal.dot(&(ray.origin - disc.centre));
-    if ray.radius == 0.0 {
-        let t = -height / cosine;
-        if !(t >= 0.0 && t.is_finite()) {
-            return None;
+    #[inline(always)]
+    fn foresee(&self, number: usize) {
+        let elements = self.elements;
+        elements.arrays.prefetch_leaf(number);
+        if let Some(rays) = elements.rays {
+            prefetch(&rays.enclosures[number]);
         }
-        let beside = (ray.at(t) - disc.centre).norm();
-        return (beside <= cell).then(|| Crossing {
-            t,
-            i,
-            beside: beside / disc.radius,
-            cosine: cosine.abs(),
-        });
     }
-    let touches = |t: f64| {
-        let x = ray.at(t);
-        let way = x - disc.nearest(&x);
-        let distance = way.norm();
-        (distance - ray.radius, if distance > 0.0 { way.dot(&ray.direction) / distance } else { -1.0 })
-    };
-    let middle = (disc.centre - ray.origin).dot(&ray.direction);
-    let mut t = (middle - disc.radius - ray.radius).max(0.0);
-    // The distance is convex along the ray, so Newton's steps from before do not pass the first zero.
-    for _ in 0..64 {
-        let (apart, slope) = touches(t);
-        if apart <= 1e-9 * (ray.radius + disc.radius) {
-            let on_disc = disc.nearest(&ray.at(t));
-            let beside = (on_disc - disc.centre).norm() / disc.radius;
-            return Some(Crossing { t, i, beside: beside.min(1.0), cosine: cosine.abs() });
-        }
-        if slope >= 0.0 {
-            break;
-        }
-        t -= apart / slope;
-    }
-    // A ball may also pass between discs.
-    let t = (-height + ray.radius.copysign(height)) / cosine;
-    let beside = (ray.at(t) - disc.centre - disc.normal * ray.radius.copysign(height)).norm();
-    let is_hole = t >= 0.0 && t.is_finite() && beside > disc.radius && beside <= cell;
-    is_hole.then(|| Crossing { t, i, beside: beside / disc.radius, cosine: cosine.abs() })
-}
 
-/// Returns `true` if a ray, with its radius, may pass through the cell of a point on a sheet.
-fn passes_cell(elements: &Elements<'_>, ray: &StoredRay, i: usize, cell: f64) -> bool {
-    let (centre, normal) = (elements.position(i), elements.normal(i));
-    let middle = (centre - ray.origin).dot(&ray.direction);
-    let off_sq = (centre - ray.at(middle)).norm_squared();
-    let reach = cell.max(f64::from(elements.arrays.obstacle_reach(i))) + ray.radius;
-    let half_sq = reach * reach * (1.0 + 1e-9) - off_sq;
-    if half_sq < 0.0 {
-        return false;
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        self.look(simd, number, self.elements.rays.and_then(|rays| rays.enclosures.get(number)))
     }
-    let half = half_sq.sqrt();
-    let (from, to) = ((middle - half).max(0.0), (middle + half).min(ray.max));
-    let layer = f64::from(SLAB * elements.arrays.radii[i]) * (1.0 + 1e-6) + ray.radius;
-    let heights = [from, to].map(|t| normal.dot(&(ray.at(t) - centre)));
-    let is_beside = heights.iter().all(|&h| h > layer) || heights.iter().all(|&h| h < -layer);
-    from <= to && !is_beside
 }
 
 impl PlaceVisitor for Cast<'_, '_> {
@@ -432,7 +370,7 @@ impl PlaceVisitor for Cast<'_, '_> {
         let d = [nodes.centre[0] - fx, nodes.centre[1] - fy, nodes.centre[2] - fz];
         let zero = f32x4::splat(simd, 0.0);
         let infinite = f32x4::splat(simd, f32::INFINITY);
-        let tiny = f32x4::splat(simd, 1e-12);
+        let tiny = f32x4::splat(simd, LEAST_SPEED);
         let (mut enter, mut exit) = (zero, f32x4::splat(simd, f32::MAX));
         for k in 0..3 {
             let [x, y, z] = nodes.axes[k];
@@ -454,6 +392,19 @@ impl PlaceVisitor for Cast<'_, '_> {
 
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        self.look(simd, number, None)
+    }
+}
+
+impl Cast<'_, '_> {
+    /// Compares the ray with the points of a leaf. An `enclosure` that it passes beside excludes them.
+    #[inline(always)]
+    fn look<S: Simd>(
+        &mut self,
+        simd: S,
+        number: usize,
+        mut enclosure: Option<&OrientedBox>,
+    ) -> ControlFlow<()> {
         let elements = self.elements;
         if elements.certifies && elements.semantics == Semantics::Surface {
             self.is_doubtful = true;
@@ -463,6 +414,13 @@ impl PlaceVisitor for Cast<'_, '_> {
         for (block, first, count) in elements.arrays.leaves.blocks(number) {
             let parts = elements.parts(simd, number, (block, first, count), true);
             let found = self.lanes.crossings(simd, (block, count), &parts, (self.most, self.thick));
+            if found.near == 0 {
+                continue;
+            }
+            // Few leaves have points near the ray that passes beside them.
+            if enclosure.take().is_some_and(|enclosure| !self.lanes.passes(enclosure, self.thick)) {
+                return ControlFlow::Continue(());
+            }
             let met = if is_thin { found.met } else { 0 };
             // A ray that crosses a cell passes through what may contain the obstacle.
             self.is_doubtful |= met != 0;

@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{
-    ClearanceGrid, LeafBlock, NodeGrid, Part, PointKind, SLAB, ScanArrays, Starts, THICKNESS,
+    ClearanceGrid, LeafBlock, NodeGrid, Part, PointKind, RayBoxes, SLAB, ScanArrays, Starts, THICKNESS,
 };
 use nearmiss_lanes::wide::{Bits, bits};
 
@@ -42,6 +42,8 @@ pub(crate) struct Elements<'a> {
     pub(crate) clear: Option<&'a ClearanceGrid>,
     /// The nodes near each place, if the scan has a shape index and the obstacle or points count.
     pub(crate) nodes: Option<&'a NodeGrid>,
+    /// The boxes around the leaves, if the scan has a shape index and the obstacle or points count.
+    pub(crate) rays: Option<&'a RayBoxes>,
     /// The detail of contacts.
     pub(crate) detail: Detail,
     pub(crate) semantics: Semantics,
@@ -124,6 +126,7 @@ impl<'a> Elements<'a> {
                 .and_then(|index| index.clear.as_deref())
                 .filter(|_| options.semantics == Semantics::Obstacle),
             nodes: placed.shapes().and_then(|index| index.nodes.as_deref()).filter(|_| is_listed),
+            rays: placed.shapes().and_then(|index| index.rays.as_deref()).filter(|_| is_listed),
             detail: options.detail,
             semantics: options.semantics,
             margin: options.margin / scale,

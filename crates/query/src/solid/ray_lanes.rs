@@ -5,7 +5,8 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
-use nearmiss_hierarchy::LeafBlock;
+use nearmiss_hierarchy::{LeafBlock, OrientedBox};
+use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_lanes::wide::{along, bits, product, squared};
 
 use crate::solid::elements::Parts;
@@ -14,6 +15,9 @@ const WIDTH: usize = LeafBlock::WIDTH;
 
 /// The least cosine of a ray and a normal at which single precision decides.
 const GRAZING: f32 = 0.05;
+
+/// The least speed along an axis by which lengths are divided.
+pub(crate) const LEAST_SPEED: f32 = 1e-12;
 
 /// The error of a place, in steps of a leaf block: those of positions, and of normals over the size of the
 /// leaf.
@@ -49,6 +53,20 @@ pub(crate) struct LaneCrossings {
 }
 
 impl LaneRay {
+    /// Returns `true` if the ray passes through a box that is grown by `radius`, the rounding errors included.
+    #[inline(always)]
+    pub(crate) fn passes(&self, of: &OrientedBox, radius: f32) -> bool {
+        let (d, mut enter, mut exit) = (sub(of.centre, self.from), 0.0_f32, f32::MAX);
+        for (axis, half) in of.axes.iter().zip(of.half) {
+            let (at, speed) = (dot(*axis, d), dot(*axis, self.along));
+            let speed = if speed.abs() < LEAST_SPEED { LEAST_SPEED } else { speed };
+            let ends = [at - half - radius, at + half + radius].map(|end| end / speed);
+            enter = enter.max(ends[0].min(ends[1]));
+            exit = exit.min(ends[0].max(ends[1]));
+        }
+        enter <= exit
+    }
+
     /// Compares the ray with the points of a block. Nothing beyond `most` is of interest; a thick ray
     /// exceeds its centre by `radius`.
     #[inline(always)]

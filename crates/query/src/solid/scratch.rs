@@ -1,8 +1,8 @@
 //! Reusable memory of questions about shapes and rays.
 
 use crate::solid::answer::ShapeContact;
-use crate::solid::cast::Crossing;
 use crate::solid::contacts::Candidates;
+use crate::solid::crossing::Crossing;
 
 /// Reusable memory; never influences an answer.
 #[derive(Debug, Clone, Default)]

@@ -3,7 +3,9 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, SLAB};
-use nearmiss_query::{CollideOptions, Detail, Evidence, Placed, Ray, Scratch, Semantics, ShapePlan, Target};
+use nearmiss_query::{
+    CollideOptions, Detail, Evidence, Placed, Ray, Scratch, Semantics, ShapeIndex, ShapePlan, Target,
+};
 use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::instructions::levels;
 use rand::RngExt;
@@ -123,7 +125,7 @@ fn the_first_hit_is_one_that_brute_force_finds() {
         let size = scan.bounds().half_extents().into_iter().fold(0.0, f64::max);
         let scale = [1.0, 1e-3, 1e4][(n / 3 % 3) as usize];
         let pose = rotation(rng).with_scale(scale).with_translation(point_in(rng, 3.0 * size * scale));
-        let placed = Placed::new(&scan, &pose);
+        let (placed, index) = (Placed::new(&scan, &pose), ShapeIndex::new(&scan));
         for round in 0..24 {
             let through = placed.point(rng.random_range(0..scan.len()));
             let d = point_in(rng, size * scale * [0.3, 0.01, 1e-4][round % 3]);
@@ -139,17 +141,27 @@ fn the_first_hit_is_one_that_brute_force_finds() {
                 _ => Semantics::Obstacle,
             };
             let options = CollideOptions::default().with_semantics(semantics).with_detail(Detail::Verdict);
-            let target = Target::new(placed, &ShapePlan::new(&options, &scan).unwrap());
+            let plan = ShapePlan::new(&options, &scan).unwrap();
+            // With an index, a tree of upright boxes leads to the leaves.
+            let targets = [placed, placed.with_shapes(&index)].map(|placed| Target::new(placed, &plan));
             let truth = brute(&placed, &ray, semantics);
             let what = format!("{kind:?} {n}, round {round}, {ray:?}");
             let mut known = None;
-            for level in levels() {
+            for (level, target) in
+                levels().into_iter().flat_map(|level| [(level, &targets[0]), (level, &targets[1])])
+            {
                 let mut scratch = Scratch::by_level(level);
                 let answer = target.cast(&ray, &mut scratch);
-                assert!(known.is_none_or(|known| known == answer), "{what}: {answer:?} by instruction set");
+                assert!(known.is_none_or(|known| known == answer), "{what}: {answer:?}, {known:?} before");
                 known = Some(answer);
                 assert_eq!(target.is_hit(&ray, &mut scratch), answer.hit.is_some(), "{what}: any hit");
             }
+            let [by_tree, by_index] = [0, 1].map(|k| {
+                let mut hits = Vec::new();
+                targets[k].cast_all(&ray, &mut hits, &mut Scratch::default());
+                hits
+            });
+            assert_eq!(by_index, by_tree, "{what}: all hits");
             let answer = known.unwrap();
             let lost = 1e-6 * size * scale + 1e-12 * (origin.norm() + size);
             let Some(hit) = answer.hit else {
@@ -180,6 +192,38 @@ fn the_first_hit_is_one_that_brute_force_finds() {
         }
     }
     assert!(hits > 300 && misses > 150 && certain > 20, "{hits} hits, {misses} misses, {certain} certain");
+}
+
+#[test]
+fn the_order_of_the_leaves_does_not_matter() {
+    let (rng, mut hits) = (&mut rng(78), 0);
+    for n in 0..4 {
+        // Few points on curved and crossing sheets, so that rays graze and pass between discs.
+        let [freedom, noise] = [[1.0, 0.02], [0.3, 0.0], [2.0, 0.1], [0.7, 0.05]][n];
+        let points: Vec<[f64; 3]> = (0..1500)
+            .map(|i| {
+                let [u, v, w] = point_in(rng, 1.0);
+                let sheet = f64::from(i % 3);
+                [u, v, 0.2 * sheet + 0.3 * (freedom * (2.0 * u + sheet)).sin() * v + noise * w]
+            })
+            .collect();
+        let cloud = PointCloud::cleaned(&points).unwrap();
+        let scan = PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(4)).unwrap();
+        let (placed, index) = (Placed::new(&scan, &Pose::IDENTITY), ShapeIndex::new(&scan));
+        let plan = ShapePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan).unwrap();
+        let targets = [placed, placed.with_shapes(&index)].map(|placed| Target::new(placed, &plan));
+        let mut scratch = Scratch::default();
+        for _ in 0..10_000 {
+            let (through, off) = (points[rng.random_range(0..points.len())], point_in(rng, 0.05));
+            let [x, y, z] = unit_vector(rng);
+            let way = [x, y, 0.3 * z];
+            let ray = Ray::new([0, 1, 2].map(|k| through[k] + off[k] - 2.0 * way[k]), way);
+            let [by_tree, by_index] = [0, 1].map(|k| targets[k].cast(&ray, &mut scratch));
+            assert_eq!(by_index, by_tree, "{n}: {ray:?}");
+            hits += usize::from(by_tree.hit.is_some());
+        }
+    }
+    assert!(hits > 10_000, "{hits} hits");
 }
 
 #[test]
