@@ -37,7 +37,6 @@ use nearmiss_lanes::parallel::change_each;
 use nearmiss_lanes::wide::{WIDTH, greatest_of_each, lanes_of, least_of_each, squared};
 use nearmiss_store::{Room, WorkError, Workspace};
 
-use self::walk::Groups;
 use crate::block::PointBlock;
 
 /// The number of levels of groups over 2³² points.
@@ -348,12 +347,6 @@ impl<'a> BlockTree<'a> {
     #[inline(always)]
     fn bounds(&self, level: usize, id: usize) -> Bounds {
         self.levels[level][id / WIDTH].get(id % WIDTH)
-    }
-
-    /// Returns the groups of boxes.
-    #[inline(always)]
-    fn groups(&self) -> Groups<'a> {
-        Groups { count: self.blocks.len(), levels: self.levels }
     }
 }
 

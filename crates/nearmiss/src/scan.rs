@@ -245,8 +245,8 @@ impl Scan {
     }
 
     /// Adds a shape index, which speeds up large numbers of queries with [`Placed::touches`],
-    /// [`Placed::nearest`], and small shapes and rays against a [`Target`](nearmiss_query::Target). Takes about
-    /// 20 ms for 100,000 points, and 0.1 ms more where a shape comes for the first time;
+    /// [`Placed::nearest`], and small shapes and rays against a [`Target`](nearmiss_query::Target).
+    /// Takes about 20 ms for 100,000 points, and 0.1 ms more where a shape comes for the first time;
     /// [`ShapeIndex`] tells when that pays off. The index is not saved.
     ///
     /// ```

@@ -365,7 +365,10 @@ fn fit<S: Simd>(
             blocks.clear();
             blocks.extend(locality.blocks.iter().map(|&block| index.blocks[block as usize]));
             decays.clear();
-            decays.extend(blocks.iter().map(|block| index.plan.decays(simd, block).to_array()));
+            // A loop, as a closure would be compiled without the instruction set.
+            for block in &*blocks {
+                decays.push(index.plan.decays(simd, block).to_array());
+            }
             fits.clear();
             lists.clear();
             ends.clear();

@@ -285,7 +285,8 @@ mod tests {
         }
     }
 
-    /// Where a ray enters a box that is grown by `radius`, in double precision; `None` where it passes beside.
+    /// Where a ray enters a box that is grown by `radius`, in double precision; `None` where it passes
+    /// beside.
     fn entry(of: &RayBox, [from, way]: [[f32; 3]; 2], radius: f64) -> Option<f64> {
         let (mut enter, mut exit) = (0.0_f64, f64::INFINITY);
         let mut cut = |low: f64, high: f64, speed: f64| {

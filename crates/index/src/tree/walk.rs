@@ -9,7 +9,7 @@ use nearmiss_lanes::wide::{Bits, WIDTH, bits};
 
 use nearmiss_store::Room;
 
-use super::{Boxes, MOST_LEVELS};
+use super::{BlockTree, Boxes, MOST_LEVELS};
 
 /// The callbacks of a traversal in the order of the points.
 pub(super) trait Walker<S: Simd> {
@@ -71,6 +71,14 @@ pub(super) struct Groups<'a> {
     pub(super) count: usize,
     /// Each level holds the boxes of the groups below. The last one has one group.
     pub(super) levels: &'a [Room<Boxes>],
+}
+
+impl<'a> BlockTree<'a> {
+    /// Returns the groups of boxes.
+    #[inline(always)]
+    pub(super) fn groups(&self) -> Groups<'a> {
+        Groups { count: self.blocks.len(), levels: self.levels }
+    }
 }
 
 impl Groups<'_> {

@@ -53,7 +53,8 @@ pub(crate) struct LaneCrossings {
 }
 
 impl LaneRay {
-    /// Returns `true` if the ray passes through a box that is grown by `radius`, the rounding errors included.
+    /// Returns `true` if the ray passes through a box that is grown by `radius`, which includes the
+    /// rounding errors.
     #[inline(always)]
     pub(crate) fn passes(&self, of: &OrientedBox, radius: f32) -> bool {
         let (d, mut enter, mut exit) = (sub(of.centre, self.from), 0.0_f32, f32::MAX);

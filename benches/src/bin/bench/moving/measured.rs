@@ -28,9 +28,9 @@ impl Times {
     }
 }
 
-/// Follows frames by one method alone, from `first` on, with questions about each frame. Each frame is written
-/// to the same memory just before, as by a simulation or a camera. Prints two rows: for calls from a thread of
-/// the pool, and for calls from outside of it.
+/// Follows frames by one method alone, from `first` on, with questions about each frame. Each frame is
+/// written to the same memory just before, as by a simulation or a camera. Prints two rows: for calls from a
+/// thread of the pool, and for calls from outside of it.
 pub(crate) fn alone(
     name: &str,
     frames: &Frames,
