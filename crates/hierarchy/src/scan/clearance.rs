@@ -129,6 +129,13 @@ impl Clearance<'_> {
         brick.nearest(place)
     }
 
+    /// Returns about the greatest distance that the nearest disc or ball may have, in whatever direction.
+    #[inline(always)]
+    #[must_use]
+    pub fn farthest(&self) -> f64 {
+        self.place.map_or(f64::INFINITY, |(_, _, away)| self.discs + 2.0 * length(away))
+    }
+
     /// Returns the direction, to within a few degrees, to the place from the disc or ball that is nearest,
     /// and an estimate of the distance from that. `None` as for [`Self::nearest`].
     #[inline(always)]
@@ -261,7 +268,7 @@ impl ClearanceGrid {
                 f64::NEG_INFINITY
             });
         };
-        let place_edge = self.blocks.edge() / f64::from(IN_BLOCK);
+        let place_edge = self.blocks.edge() * (1.0 / f64::from(IN_BLOCK));
         // The distance from the centre of the block or the cube, which has as many places along each axis.
         let off = |places: u32| {
             length([0, 1, 2].map(|k| {

@@ -150,9 +150,17 @@ impl<'a> Solid<'a> {
     }
 
     /// A single place of the stored frame.
+    #[inline]
     pub(crate) fn point(place: Vector) -> Self {
         let axes = [Vector::x(), Vector::y(), Vector::z()];
         Self { core: Core::Point, radius: 0.0, centre: place, axes, half: Vector::zeros(), inside: place }
+    }
+
+    /// A ball of the stored frame; `None` if a coordinate is not finite or the radius is not a length.
+    #[inline]
+    pub(crate) fn ball((centre, radius): (Vector, f64)) -> Option<Self> {
+        let is_valid = centre.iter().all(|c| c.is_finite()) && radius.is_finite() && radius >= 0.0;
+        is_valid.then_some(Self { radius, ..Self::point(centre) })
     }
 
     /// Returns `true` if distances of the core from points are those of its bounding box.

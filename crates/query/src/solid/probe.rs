@@ -15,6 +15,12 @@ const MOST_PARTS: usize = 11;
 /// The maximum number of parts if only a touch is left to find.
 const MOST_TO_TOUCH: usize = 5;
 
+/// The maximum number of parts that wait for others: each one that is halved leaves one more.
+const MOST_WAITING: usize = MOST_PARTS / 2 + 1;
+
+/// A direction from the nearest point, and its distance.
+type Direction = ([f64; 3], f64);
+
 /// The answer of the grid about a shape.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Probed<'a> {
@@ -34,23 +40,30 @@ pub(crate) fn is_far(elements: &Elements<'_>, solid: &Solid<'_>) -> bool {
     told.is_some_and(|at| at.discs > within)
 }
 
-/// Returns what the grid tells about the centre of a shape, and whether that proves that no part of the scan
-/// is within the margin of a ball about the shape: the core of such a shape need not be worked out. `None`
-/// without a grid, and for shapes of any places.
+/// The answer of the grid about the centre of a shape.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct About<'a> {
+    pub(crate) at: Clearance<'a>,
+    /// `true` if this proves that no part of the scan is within the margin of a ball about the shape: the
+    /// core of such a shape need not be worked out.
+    pub(crate) is_clear: bool,
+    /// The centre, and the radius about the core, in the stored frame.
+    pub(crate) ball: (Vector3<f64>, f64),
+}
+
+/// Looks up the centre of a shape. `None` without a grid, and for shapes of any places.
 ///
 /// `proven` selects the volumes that contain the obstacle instead of the discs and balls.
 #[inline(always)]
-pub(crate) fn about<'a>(
-    elements: &Elements<'a>,
-    shape: &Shape<'_>,
-    proven: bool,
-) -> Option<(Clearance<'a>, bool)> {
+pub(crate) fn about<'a>(elements: &Elements<'a>, shape: &Shape<'_>, proven: bool) -> Option<About<'a>> {
     let (grid, (centre, [radius, beyond])) = (elements.clear?, shape.ball()?);
     let placed = elements.placed.stored_to_world();
-    let within = elements.margin + radius / placed.scale();
-    let at = grid.at(&elements.arrays, placed.apply_inverse(centre), within);
+    let (centre, radius) = (placed.apply_inverse(centre), radius / placed.scale());
+    let within = elements.margin + radius;
+    let at = grid.at(&elements.arrays, centre, within);
     let bound = if proven { at.obstacle } else { at.discs };
-    Some((at, bound > within + beyond / placed.scale() * (1.0 + 1e-9)))
+    let is_clear = bound > within + beyond / placed.scale() * (1.0 + 1e-9);
+    Some(About { at, is_clear, ball: (centre.into(), radius) })
 }
 
 /// Probes the grid at the centre of a shape and, where that does not decide, at the centres of parts of its
@@ -69,17 +82,11 @@ pub(crate) fn probe<'a>(
     let Some(grid) = elements.clear else { return Probed::Open(None) };
     let within = elements.margin + solid.radius;
     let probes = Probes { elements, grid, within, proven };
-    let mut named = |at: &Clearance<'_>, inner: f64| match at.nearest() {
-        Some((leaf, number)) if at.discs <= within + inner => {
-            each(elements.arrays.leaves.points(leaf).start + number)
-        }
-        _ => ControlFlow::Continue(()),
-    };
     let centre = centre.unwrap_or_else(|| probes.at(solid.centre));
     if probes.bound(&centre) > within + solid.half.norm() {
         return Probed::Clear;
     }
-    let mut waiting = [Part { place: solid.centre, half: solid.half }; MOST_PARTS];
+    let mut waiting = [Part { place: solid.centre, half: solid.half }; MOST_WAITING];
     let (mut left, mut count, mut is_clear) = (1, 1, true);
     while left > 0 {
         left -= 1;
@@ -91,25 +98,21 @@ pub(crate) fn probe<'a>(
             continue;
         }
         // A ball of this radius about the place is in the core, if that is a point, a segment or a box.
-        let inner = part.half.min();
-        let direction = at.direction();
-        let may_touch = direction.is_none_or(|(_, distance)| distance <= within + inner);
-        if may_touch && named(&at, inner).is_break() {
+        let (named, direction) = probes.named(&at, part.half.min());
+        if named.is_some_and(|i| each(i).is_break()) {
             return Probed::Ended;
         }
+        let direction = direction.or_else(|| at.direction());
         if is_clear {
-            bound = bound.max(probes.beyond(part.place, &at));
+            bound = bound.max(probes.beyond(part.place, direction));
             if bound > cover {
                 continue;
             }
         }
         is_clear &= bound > within;
         let most = if is_clear { MOST_PARTS } else { MOST_TO_TOUCH };
-        match part.halves(
-            solid,
-            (bound - within).max(0.0),
-            direction.map_or(Vector3::zeros(), |own| own.0.into()),
-        ) {
+        let clear = (bound - within).max(0.0);
+        match part.halves(solid, clear, direction.map_or(Vector3::zeros(), |own| own.0.into())) {
             None => {}
             Some(_) if count + 2 > most => is_clear = false,
             Some(halves) => {
@@ -119,6 +122,28 @@ pub(crate) fn probe<'a>(
         }
     }
     if is_clear { Probed::Clear } else { Probed::Open(Some((grid, centre))) }
+}
+
+/// Probes the grid at the centre of a ball, given what it told about that. As [`probe`], which takes longer
+/// to set up. The caller has found that the centre alone does not prove a separation.
+#[inline(always)]
+pub(crate) fn probe_ball<'a>(
+    elements: &Elements<'a>,
+    solid: &Solid<'_>,
+    (proven, at): (bool, Clearance<'a>),
+    mut each: impl FnMut(usize) -> ControlFlow<()>,
+) -> Probed<'a> {
+    let Some(grid) = elements.clear else { return Probed::Open(None) };
+    let probes = Probes { elements, grid, within: elements.margin + solid.radius, proven };
+    let (named, direction) = probes.named(&at, 0.0);
+    if named.is_some_and(|i| each(i).is_break()) {
+        return Probed::Ended;
+    }
+    let direction = direction.or_else(|| at.direction());
+    if probes.beyond(solid.centre, direction) > probes.within {
+        return Probed::Clear;
+    }
+    Probed::Open(Some((grid, at)))
 }
 
 /// A part of a core, or a box about it.
@@ -167,11 +192,23 @@ impl<'a> Probes<'_, 'a> {
         if self.proven { at.obstacle } else { at.discs }
     }
 
-    /// The bound about a place by what the grid knows beyond it, seen from the nearest point.
+    /// Returns the point that is named at a place, if a ball of radius `inner` about the place touches there.
+    /// Also the direction, if it was needed.
     #[inline(always)]
-    fn beyond(&self, place: Vector3<f64>, at: &Clearance<'_>) -> f64 {
+    fn named(&self, at: &Clearance<'_>, inner: f64) -> (Option<usize>, Option<Direction>) {
+        let most = self.within + inner;
+        let touches = at.farthest() <= most;
+        let direction = if touches { None } else { at.direction() };
+        let may_touch = touches || at.discs <= most && direction.is_none_or(|(_, distance)| distance <= most);
+        let point = |(leaf, number)| self.elements.arrays.leaves.points(leaf).start + number;
+        (if may_touch { at.nearest().map(point) } else { None }, direction)
+    }
+
+    /// The bound about a place by what the grid knows beyond it, in a direction from the nearest point.
+    #[inline(always)]
+    fn beyond(&self, place: Vector3<f64>, direction: Option<Direction>) -> f64 {
         let length = self.grid.step_beyond(self.within);
-        let Some((step, _)) = at.direction().filter(|_| length > 0.0) else { return self.bound(at) };
+        let Some((step, _)) = direction.filter(|_| length > 0.0) else { return f64::NEG_INFINITY };
         let step = Vector3::from(step) * length;
         let reach = self.within + length;
         let other = self.grid.beside(&self.elements.arrays, (place + step).into(), (-step).into(), reach);

@@ -191,19 +191,22 @@ impl Shape<'_> {
     }
 
     /// Returns `true` if no length is negative, infinite or NaN, and all coordinates are finite.
+    #[inline]
     pub(crate) fn is_valid(&self) -> bool {
-        let is_finite = |points: &[[f64; 3]]| points.iter().flatten().all(|c| c.is_finite());
-        let are_finite = match *self {
-            Self::Sphere { centre, .. } => is_finite(&[centre]),
-            Self::Capsule { ends, .. } => is_finite(&ends),
+        // Zero times a number that is not finite is NaN.
+        let sum_of_zeros = |p: [f64; 3]| p[0] * 0.0 + p[1] * 0.0 + p[2] * 0.0;
+        let zero = match *self {
+            Self::Sphere { centre, .. } => sum_of_zeros(centre),
+            Self::Capsule { ends: [p, q], .. } => sum_of_zeros(p) + sum_of_zeros(q),
             Self::Box { pose, .. } | Self::Cylinder { pose, .. } | Self::Cone { pose, .. } => {
-                is_finite(&[pose.translation()])
+                sum_of_zeros(pose.translation())
             }
-            Self::Triangle { points, .. } => is_finite(&points),
-            Self::Hull { points, .. } => is_finite(points),
-            Self::Own { map, .. } => is_finite(&[map.centre()]),
+            Self::Triangle { points: [p, q, r], .. } => sum_of_zeros(p) + sum_of_zeros(q) + sum_of_zeros(r),
+            Self::Hull { points, .. } => points.iter().map(|&p| sum_of_zeros(p)).sum(),
+            Self::Own { map, .. } => sum_of_zeros(map.centre()),
         };
-        are_finite && self.lengths().iter().all(|&l| l >= 0.0 && l.is_finite())
+        let lengths = self.lengths();
+        !zero.is_nan() && lengths.iter().all(|&l| l >= 0.0 && l.is_finite())
     }
 
     /// A bounding box of the shape in the world, rounding included; `None` if a length is negative or

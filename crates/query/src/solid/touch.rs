@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd, f32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Clearance, PlaceVisitor, Siblings};
+use nearmiss_hierarchy::{Clearance, ClearanceGrid, PlaceVisitor, Siblings};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::Bits;
 
@@ -17,7 +17,7 @@ use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
 use crate::solid::meeting::verified_in;
-use crate::solid::probe::{Probed, about, probe};
+use crate::solid::probe::{About, Probed, about, probe, probe_ball};
 use crate::solid::shape::Shape;
 
 /// Discs at which a point of the surface in the shape is looked for.
@@ -60,11 +60,35 @@ pub(crate) fn touch_shape(
     working: (Level, &mut ViewScratch),
 ) -> ShapeAnswer {
     let told = about(elements, shape, elements.certifies);
-    if told.is_some_and(|(_, is_clear)| is_clear) {
+    if told.is_some_and(|told| told.is_clear) {
         return separated(elements, false);
     }
+    if let (Shape::Sphere { .. }, Some(told)) = (shape, &told) {
+        return touch_ball(elements, told, working);
+    }
     let solid = Solid::new(shape, elements.placed.stored_to_world());
-    touch(elements, solid.as_ref(), told.map(|(at, _)| at), working)
+    touch(elements, solid.as_ref(), told.map(|told| told.at), working)
+}
+
+/// Decides whether a ball touches the scan, given what the grid told about its centre.
+fn touch_ball<'a>(
+    elements: &Elements<'a>,
+    told: &About<'a>,
+    (level, scratch): (Level, &mut ViewScratch),
+) -> ShapeAnswer {
+    let Some(solid) = Solid::ball(told.ball) else { return invalid() };
+    let mut found = Findings::NONE;
+    match probe_ball(elements, &solid, (elements.certifies, told.at), |i| found.examine(elements, &solid, i))
+    {
+        Probed::Clear => separated(elements, false),
+        Probed::Ended => found.answer(elements, &solid, scratch),
+        Probed::Open(at) => search(elements, &solid, at, (level, scratch)),
+    }
+}
+
+/// The answer about an invalid shape.
+fn invalid() -> ShapeAnswer {
+    ShapeAnswer { verdict: ShapeVerdict::Undecided(Reason::Shape), band: f64::INFINITY }
 }
 
 /// The answer about a shape that touches nothing, near which enclosures may be if `is_doubtful`.
@@ -80,15 +104,22 @@ pub(crate) fn touch<'a>(
     told: Option<Clearance<'a>>,
     (level, scratch): (Level, &mut ViewScratch),
 ) -> ShapeAnswer {
-    let Some(solid) = solid else {
-        return ShapeAnswer { verdict: ShapeVerdict::Undecided(Reason::Shape), band: f64::INFINITY };
-    };
+    let Some(solid) = solid else { return invalid() };
     let mut found = Findings::NONE;
-    let at = match probe(elements, solid, (elements.certifies, told), |i| found.examine(elements, solid, i)) {
-        Probed::Clear => return separated(elements, false),
-        Probed::Ended => return found.answer(elements, solid, scratch),
-        Probed::Open(at) => at,
-    };
+    match probe(elements, solid, (elements.certifies, told), |i| found.examine(elements, solid, i)) {
+        Probed::Clear => separated(elements, false),
+        Probed::Ended => found.answer(elements, solid, scratch),
+        Probed::Open(at) => search(elements, solid, at, (level, scratch)),
+    }
+}
+
+/// Compares `solid` with the points of all leaves near it, given what the grid told about the centre.
+fn search(
+    elements: &Elements<'_>,
+    solid: &Solid<'_>,
+    at: Option<(&ClearanceGrid, Clearance<'_>)>,
+    (level, scratch): (Level, &mut ViewScratch),
+) -> ShapeAnswer {
     let mut near = Near::new(elements, solid, elements.certifies);
     near.limit(elements.margin);
     let mut search = Touch { near, found: Findings::NONE };
@@ -271,7 +302,7 @@ mod tests {
             let expected = touch(&elements, Some(&solid), None, (level, &mut *scratch));
             assert_eq!(found, expected, "round {round}: {shape:?}");
             let told = about(&elements, &shape, elements.certifies);
-            clear[round % 5] += usize::from(told.is_some_and(|(_, is_clear)| is_clear));
+            clear[round % 5] += usize::from(told.is_some_and(|told| told.is_clear));
             met[round % 5] += usize::from(found.verdict.is_touching());
         }
         assert!(clear.iter().chain(&met).all(|&count| count > 60), "{clear:?} clear, {met:?} touch");
