@@ -45,7 +45,7 @@ fn hints_change_no_verdict() {
     let kinds =
         [CloudKind::Sphere, CloudKind::Lattice, CloudKind::Clustered, CloudKind::Rings, CloudKind::Coplanar];
     let (mut seen, mut skipped, mut proven, mut evident) = ([0; 3], 0, 0, [0; 2]);
-    for (n, cloud) in (0_u64..).zip(kinds.iter().cycle().take(10)) {
+    for (n, cloud) in (0_u64..).zip(&kinds) {
         let a = prepared(&arbitrary::cloud(*cloud, 400, n));
         let b = prepared(&arbitrary::cloud(*cloud, 300, n + 50));
         let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
@@ -106,8 +106,8 @@ fn hints_change_no_verdict() {
             }
         }
     }
-    assert!(seen[0] > 1000 && seen[1] > 3000, "{seen:?}");
-    assert!(skipped > 1000, "{skipped} answers came without any search");
+    assert!(seen[0] > 500 && seen[1] > 1500, "{seen:?}");
+    assert!(skipped > 500, "{skipped} answers came without any search");
     assert!(proven > 1000, "{proven} separations were certified");
     // The enclosures of two nodes may be disjoint even if those of two of their children are not
     // proven to be.

@@ -19,7 +19,7 @@ fn spheres_that_graze_discs_touch() {
         let options = CollideOptions::estimated().with_detail(Detail::Verdict);
         let plan = ShapePlan::new(&options, &scan).unwrap();
         let mut scratch = Scratch::default();
-        for round in 0..100 {
+        for round in 0..40 {
             let about = plain.point(rng.random_range(0..scan.len()));
             let d = point_in(rng, 2.0 * r);
             let centre = [0, 1, 2].map(|k| about[k] + d[k]);
@@ -41,5 +41,5 @@ fn spheres_that_graze_discs_touch() {
             }
         }
     }
-    assert!(seen.iter().all(|&n| n > 150), "both answers: {seen:?}");
+    assert!(seen.iter().all(|&n| n > 60), "both answers: {seen:?}");
 }

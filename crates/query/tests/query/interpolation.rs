@@ -40,38 +40,36 @@ fn ask(a: &Placed<'_>, b: &Placed<'_>, options: &CollideOptions, scratch: &mut S
 fn no_verdict_is_wrong_outside_the_band() {
     let mut scratch = Scratch::default();
     let (mut judged, mut meeting, mut missed) = (0, 0, [0; 2]);
-    for seed in [1, 2] {
-        let set = analytic_set(seed, &SetOptions { repeats: 1, ..SetOptions::default() });
-        let scans: Vec<Scan> = set.shapes.iter().map(|shape| scan(&shape.points)).collect();
-        for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
-            let views = [scans[pair.a].at(&pair.pose_a), scans[pair.b].at(&pair.pose_b)];
-            for [a, b] in [views, [views[1], views[0]]] {
-                let case = || format!("{}, noise {}, gap {} r", pair.family, pair.noise, pair.gap / pair.r);
-                judged += 1;
-                meeting += u32::from(pair.truth);
-                for detail in [Detail::Verdict, Detail::Witness] {
-                    let whole = options(Interpolation::default()).with_detail(detail);
-                    let verdict = ask(&a, &b, &whole, &mut scratch).verdict;
-                    let by_discs =
-                        CollideOptions::estimated().with_semantics(Semantics::Surface).with_detail(detail);
-                    let expected = ask(&a, &b, &by_discs, &mut scratch).verdict;
-                    let is_open = pair.thin && verdict == Verdict::Undecided(Reason::Ambiguous);
-                    assert!(is_open || verdict.is_intersecting() == pair.truth, "{}: {verdict:?}", case());
-                    assert!(is_open || verdict.is_separated() != pair.truth, "{}: {verdict:?}", case());
-                    assert_eq!(verdict.is_separated(), expected.is_separated(), "{}", case());
-                }
-                // Without hierarchy small contacts may be missed, but none may be invented.
-                for (missed, brackets) in missed.iter_mut().zip([Brackets::Drawn, Brackets::Annulus]) {
-                    let drawn = options(flat().with_brackets(brackets)).with_detail(Detail::Verdict);
-                    let verdict = ask(&a, &b, &drawn, &mut scratch).verdict;
-                    assert!(pair.truth || !verdict.is_intersecting(), "{}: {verdict:?}", case());
-                    *missed += u32::from(pair.truth && !verdict.is_intersecting());
-                }
+    let set = analytic_set(1, &SetOptions { repeats: 1, ..SetOptions::default() });
+    let scans: Vec<Scan> = set.shapes.iter().map(|shape| scan(&shape.points)).collect();
+    for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
+        let views = [scans[pair.a].at(&pair.pose_a), scans[pair.b].at(&pair.pose_b)];
+        for [a, b] in [views, [views[1], views[0]]] {
+            let case = || format!("{}, noise {}, gap {} r", pair.family, pair.noise, pair.gap / pair.r);
+            judged += 1;
+            meeting += u32::from(pair.truth);
+            for detail in [Detail::Verdict, Detail::Witness] {
+                let whole = options(Interpolation::default()).with_detail(detail);
+                let verdict = ask(&a, &b, &whole, &mut scratch).verdict;
+                let by_discs =
+                    CollideOptions::estimated().with_semantics(Semantics::Surface).with_detail(detail);
+                let expected = ask(&a, &b, &by_discs, &mut scratch).verdict;
+                let is_open = pair.thin && verdict == Verdict::Undecided(Reason::Ambiguous);
+                assert!(is_open || verdict.is_intersecting() == pair.truth, "{}: {verdict:?}", case());
+                assert!(is_open || verdict.is_separated() != pair.truth, "{}: {verdict:?}", case());
+                assert_eq!(verdict.is_separated(), expected.is_separated(), "{}", case());
+            }
+            // Without hierarchy small contacts may be missed, but none may be invented.
+            for (missed, brackets) in missed.iter_mut().zip([Brackets::Drawn, Brackets::Annulus]) {
+                let drawn = options(flat().with_brackets(brackets)).with_detail(Detail::Verdict);
+                let verdict = ask(&a, &b, &drawn, &mut scratch).verdict;
+                assert!(pair.truth || !verdict.is_intersecting(), "{}: {verdict:?}", case());
+                *missed += u32::from(pair.truth && !verdict.is_intersecting());
             }
         }
     }
-    assert!(judged > 6000 && meeting > 2500, "{judged} questions, {meeting} of what meets");
-    // Measured: 0 missed of 2,562.
+    assert!(judged > 3000 && meeting > 1250, "{judged} questions, {meeting} of what meets");
+    // Measured: 0 missed of 2,562, with two seeds.
     assert!(missed.iter().all(|&missed| missed <= meeting / 1000), "{missed:?} of {meeting} missed");
 }
 

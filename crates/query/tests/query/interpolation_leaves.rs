@@ -130,26 +130,24 @@ fn edges_that_cross_are_those_of_brute_force() {
     let finer: Vec<Scan> = forms.iter().map(|form| scan(form(), 0.08, 0.1)).collect();
     let mut rng = arbitrary::rng(4);
     let [mut crossing, mut on_edges] = [0; 2];
-    for a in &scans {
-        for b in &finer {
-            for scale in [1.0, 0.7] {
-                let pose = arbitrary::rotation(&mut rng)
-                    .with_translation(arbitrary::point_in(&mut rng, 0.9))
-                    .with_scale(scale);
-                for scans in [[a, b], [b, a]] {
-                    let [crosses, on] = check(scans, &pose);
-                    (crossing, on_edges) = (crossing + crosses, on_edges + on);
-                }
+    for (i, a) in scans.iter().enumerate() {
+        for (j, b) in finer.iter().enumerate() {
+            let pose = arbitrary::rotation(&mut rng)
+                .with_translation(arbitrary::point_in(&mut rng, 0.9))
+                .with_scale([1.0, 0.7][(i + j) % 2]);
+            for scans in [[a, b], [b, a]] {
+                let [crosses, on] = check(scans, &pose);
+                (crossing, on_edges) = (crossing + crosses, on_edges + on);
             }
         }
     }
     // Where the surfaces graze each other, single edges cross.
-    for round in 0..30 {
-        let away = 1.8 + 0.006 * f64::from(round);
+    for round in 0..15 {
+        let away = 1.8 + 0.012 * f64::from(round);
         let axis = arbitrary::unit_vector(&mut rng).map(|x| away * x);
         let pose = arbitrary::rotation(&mut rng).with_translation(axis);
         let [crosses, on] = check([&scans[0], &finer[0]], &pose);
         (crossing, on_edges) = (crossing + crosses, on_edges + on);
     }
-    assert!(crossing > 2000 && on_edges > 400, "{crossing} edges cross, {on_edges} contacts are on edges");
+    assert!(crossing > 1000 && on_edges > 200, "{crossing} edges cross, {on_edges} contacts are on edges");
 }
