@@ -13,7 +13,7 @@
 //! than promised, a search among all points that could be on a shorter path follows.
 
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{for_each, ranges, ranges_with};
+use nearmiss_lanes::parallel::{change_each, ranges, ranges_with};
 use nearmiss_store::Array;
 
 use crate::close_list::{BESIDE, Beside, Close, CloseList, Lists, floor, kept, pack};
@@ -440,7 +440,7 @@ fn sort_lists(starts: &[u32], pairs: &mut [Close]) {
         stretches.push((starts, some));
         rest = others;
     }
-    for_each(stretches, |(starts, pairs)| {
+    change_each(&mut stretches, 1, |_, (starts, pairs)| {
         for two in starts.windows(2) {
             let list = (two[0] - starts[0]) as usize..(two[1] - starts[0]) as usize;
             pairs[list].sort_unstable_by_key(rank);

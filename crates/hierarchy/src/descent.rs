@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_lanes::wide::bits;
+use nearmiss_lanes::wide::{bits, common};
 
 use crate::bounds::boxes::Relative;
 use crate::bounds::lanes::along_normals;
@@ -350,7 +350,17 @@ impl TreePair<'_> {
     /// Computes [`Relative::gap`] and [`Relative::overlap`] of all lanes, in the same order of
     /// operations.
     #[inline(always)]
-    fn compare<S: Simd>(&self, simd: S, [a, b]: [&Siblings; 2], there: u32, notes_gaps: bool) -> Near<S> {
+    fn compare<S: Simd>(&self, simd: S, boxes: [&Siblings; 2], there: u32, notes_gaps: bool) -> Near<S> {
+        common(
+            simd,
+            #[inline(always)]
+            || self.compare_by(simd, boxes, there, notes_gaps),
+        )
+    }
+
+    /// Does the same as [`Self::compare`], as part of the caller.
+    #[inline(always)]
+    fn compare_by<S: Simd>(&self, simd: S, [a, b]: [&Siblings; 2], there: u32, notes_gaps: bool) -> Near<S> {
         let boxes_a = a.boxes(simd).repeated();
         let boxes_b = self.relative.boxes_of_four(&b.boxes(simd)).spread();
         let mut gap = f32x16::splat(simd, f32::MIN);

@@ -1,28 +1,25 @@
 //! Data-parallel loops: on one thread, or with the feature `rayon` on all threads of the current
 //! pool. Results come in order, so they are the same for any number of threads.
+//!
+//! Every loop divides its items in halves until few are left ([`change_together`]). The division is compiled
+//! once, not for each closure: the iterators of rayon are a hundred functions a loop, and were half of what
+//! the compiler had to do for the libraries with many loops.
 
+use std::mem::MaybeUninit;
 use std::ops::Range;
-#[cfg(feature = "rayon")]
 use std::sync::{Mutex, PoisonError};
 
 /// The number of items of at most a microsecond that a thread takes at once, enough to hide the
 /// cost of scheduling.
 const AT_ONCE: usize = 1024;
 
-/// The minimum number of pieces of a loop with expensive steps. A thread that has finished can take over
-/// pieces that no other has begun, so threads finish at nearly the same time.
-#[cfg(feature = "rayon")]
-const PIECES: usize = 64;
+/// The number of pieces of a long loop with expensive steps. A thread that has finished can take over pieces
+/// that no other has begun, so threads finish at nearly the same time.
+const PIECES: usize = 256;
 
 /// Maps each number below `count`. For cheap `f`: a thread takes many numbers at once.
 pub fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        (0..count).into_par_iter().with_min_len(AT_ONCE).map(f).collect()
-    }
-    #[cfg(not(feature = "rayon"))]
-    (0..count).map(f).collect()
+    collected(count, AT_ONCE, |range| range.map(&f))
 }
 
 /// Maps each item. For cheap `f`: a thread takes many items at once.
@@ -48,40 +45,59 @@ pub fn map_with<S: Send, R: Send>(
     scratch: impl Fn() -> S + Sync + Send,
     f: impl Fn(&mut S, usize) -> R + Sync + Send,
 ) -> Vec<R> {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        let (most, pool) = (count.div_ceil(PIECES), Mutex::new(Vec::new()));
-        let lend = || Lent { scratch: taken(&pool), pool: &pool };
-        let f = |lent: &mut Lent<'_, S>, i| f(lent.scratch.get_or_insert_with(&scratch), i);
-        (0..count).into_par_iter().with_max_len(most).map_init(lend, f).collect()
-    }
-    #[cfg(not(feature = "rayon"))]
-    {
-        let mut scratch = scratch();
-        (0..count).map(|i| f(&mut scratch, i)).collect()
-    }
+    let pool = Mutex::new(Vec::new());
+    let (scratch, f) = (&scratch, &f);
+    collected(count, count.div_ceil(PIECES), |range| {
+        let mut lent = Lent::new(&pool, scratch);
+        range.map(move |i| f(lent.scratch(), i))
+    })
+}
+
+/// Collects what `f` yields for consecutive ranges of about `at_once` numbers that partition `0..count`.
+/// Panics if it yields too little.
+#[expect(unsafe_code, reason = "the standard library has no safe function for it")]
+fn collected<R: Send, I: Iterator<Item = R>>(
+    count: usize,
+    at_once: usize,
+    f: impl Fn(Range<usize>) -> I + Sync,
+) -> Vec<R> {
+    let mut all = Vec::with_capacity(count);
+    let slots: &mut [MaybeUninit<R>] = &mut all.spare_capacity_mut()[..count];
+    divided(0..count, at_once, runs(slots, 1), &|range, part: Runs<'_, MaybeUninit<R>>| {
+        let mut results = f(range);
+        for slot in part.elements {
+            slot.write(results.next().expect("a result for each number"));
+        }
+    });
+    // SAFETY: the loop has written every slot; had it panicked, the length would still be 0.
+    unsafe { all.set_len(count) };
+    all
 }
 
 /// Scratch memory that returns to a pool after use.
-#[cfg(feature = "rayon")]
-struct Lent<'a, S> {
+struct Lent<'a, S, F> {
     scratch: Option<S>,
     pool: &'a Mutex<Vec<S>>,
+    make: &'a F,
 }
 
-#[cfg(feature = "rayon")]
-impl<S> Drop for Lent<'_, S> {
+impl<'a, S, F: Fn() -> S> Lent<'a, S, F> {
+    /// Takes scratch memory from a pool, if there is some.
+    fn new(pool: &'a Mutex<Vec<S>>, make: &'a F) -> Self {
+        let scratch = pool.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        Self { scratch, pool, make }
+    }
+
+    fn scratch(&mut self) -> &mut S {
+        self.scratch.get_or_insert_with(self.make)
+    }
+}
+
+impl<S, F> Drop for Lent<'_, S, F> {
     fn drop(&mut self) {
         let mut pool = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
         pool.extend(self.scratch.take());
     }
-}
-
-/// Takes scratch memory from a pool, if there is some.
-#[cfg(feature = "rayon")]
-fn taken<S>(pool: &Mutex<Vec<S>>) -> Option<S> {
-    pool.lock().unwrap_or_else(PoisonError::into_inner).pop()
 }
 
 /// Maps consecutive ranges of 1024 numbers that partition `0..count`.
@@ -134,21 +150,12 @@ pub fn fill_with<S: Send, T: Send>(
     f: impl Fn(&mut S, Range<usize>, &mut [T]) + Sync + Send,
 ) {
     let count = out.len().div_ceil(each);
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        // Few items at once if there are not many, so that threads finish at nearly the same time.
-        let length = (count / (4 * PIECES)).clamp(1, 16);
-        let (most, pool) = (count.div_ceil(length * PIECES).max(1), Mutex::new(Vec::new()));
-        let lend = || Lent { scratch: taken(&pool), pool: &pool };
-        let runs = out.par_chunks_mut(length * each).with_max_len(most).enumerate();
-        runs.for_each_init(lend, |lent, (run, part)| {
-            let items = run * length..((run + 1) * length).min(count);
-            f(lent.scratch.get_or_insert_with(&scratch), items, part);
-        });
-    }
-    #[cfg(not(feature = "rayon"))]
-    f(&mut scratch(), 0..count, out);
+    // Few items at once if there are not many, so that threads finish at nearly the same time.
+    let at_once = (count / PIECES).clamp(1, 16);
+    let pool = Mutex::new(Vec::new());
+    divided(0..count, at_once, runs(out, each), &|items, part: Runs<'_, T>| {
+        f(Lent::new(&pool, &scratch).scratch(), items, part.elements);
+    });
 }
 
 /// Sets every item of `out` to `f` of its index. For cheap `f`: a thread takes many items at once.
@@ -159,51 +166,32 @@ pub fn fill<T: Send>(out: &mut [T], f: impl Fn(usize) -> T + Sync + Send) {
 /// Passes each run of `length` items and its number to `f`, which fills it in place; the last run
 /// may be shorter. For cheap `f`: a thread takes many runs at once.
 pub fn fill_runs<T: Send>(out: &mut [T], length: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        let runs = out.par_chunks_mut(length).with_min_len(AT_ONCE).enumerate();
-        runs.for_each(|(number, run)| f(number, run));
-    }
-    #[cfg(not(feature = "rayon"))]
-    out.chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
+    change_runs_by(out, length, AT_ONCE, f);
 }
 
 /// Does the same as [`fill_runs`] for expensive `f`: the runs are scheduled one by one.
 pub fn change_runs<T: Send>(out: &mut [T], length: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        out.par_chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
-    }
-    #[cfg(not(feature = "rayon"))]
-    out.chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
+    change_runs_by(out, length, 1, f);
 }
 
-/// Passes every item to `f`.
-pub fn for_each<T: Send>(items: Vec<T>, f: impl Fn(T) + Sync + Send) {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        items.into_par_iter().for_each(f);
-    }
-    #[cfg(not(feature = "rayon"))]
-    items.into_iter().for_each(f);
+fn change_runs_by<T: Send>(
+    out: &mut [T],
+    length: usize,
+    at_once: usize,
+    f: impl Fn(usize, &mut [T]) + Sync + Send,
+) {
+    let count = out.len().div_ceil(length);
+    divided(0..count, at_once, runs(out, length), &|numbers, part: Runs<'_, T>| {
+        numbers.zip(part.elements.chunks_mut(length)).for_each(|(number, run)| f(number, run));
+    });
 }
 
 /// Passes every item and its index to `f`, which changes it in place. A thread takes at least
 /// `at_once` items.
 pub fn change_each<T: Send>(all: &mut [T], at_once: usize, f: impl Fn(usize, &mut T) + Sync + Send) {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        all.par_iter_mut().with_min_len(at_once).enumerate().for_each(|(i, one)| f(i, one));
-    }
-    #[cfg(not(feature = "rayon"))]
-    {
-        let _ = at_once;
-        all.iter_mut().enumerate().for_each(|(i, one)| f(i, one));
-    }
+    divided(0..all.len(), at_once, runs(all, 1), &|range, part: Runs<'_, T>| {
+        range.zip(part.elements).for_each(|(i, one)| f(i, one));
+    });
 }
 
 /// Passes every pair of items and its index to `f`, which changes both in place. A thread takes at
@@ -214,17 +202,10 @@ pub fn change_both<A: Send, B: Send>(
     at_once: usize,
     f: impl Fn(usize, &mut A, &mut B) + Sync + Send,
 ) {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        let all = a.par_iter_mut().zip(b).with_min_len(at_once).enumerate();
-        all.for_each(|(i, (a, b))| f(i, a, b));
-    }
-    #[cfg(not(feature = "rayon"))]
-    {
-        let _ = at_once;
-        a.iter_mut().zip(b).enumerate().for_each(|(i, (a, b))| f(i, a, b));
-    }
+    let count = a.len().min(b.len());
+    divided(0..count, at_once, (runs(a, 1), runs(b, 1)), &|range, (a, b): (Runs<'_, A>, Runs<'_, B>)| {
+        range.zip(a.elements).zip(b.elements).for_each(|((i, a), b)| f(i, a, b));
+    });
 }
 
 /// Parts of arrays that belong to the same items, and can be divided between threads.
@@ -279,24 +260,56 @@ pub fn change_together<P: Divide>(
     parts: P,
     f: &(impl Fn(Range<usize>, P) + Sync + Send),
 ) {
+    divided(items, at_once, parts, f);
+}
+
+/// The loop of all others. The closure is no type parameter, so that it is compiled once for each kind of
+/// array.
+fn divided<P: Divide>(items: Range<usize>, at_once: usize, parts: P, f: &(dyn Fn(Range<usize>, P) + Sync)) {
+    let at_once = at_once.max(1);
     if items.len() <= at_once {
         return f(items, parts);
     }
     let half = items.len().div_ceil(at_once) / 2 * at_once;
     let middle = items.start + half;
     let (left, right) = parts.divide(half);
-    both(
-        || change_together(items.start..middle, at_once, left, f),
-        || change_together(middle..items.end, at_once, right, f),
-    );
+    both(|| divided(items.start..middle, at_once, left, f), || divided(middle..items.end, at_once, right, f));
 }
 
 /// Runs both closures, in parallel if there are several threads, and returns both results.
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    by_reference(a, |a| by_reference(b, |b| join(a, b)).0)
+}
+
+/// Passes `work` to `run` by reference, so that `run` is compiled once for all closures. Returns the results
+/// of both. `run` must call `work`.
+fn by_reference<R: Send, T>(
+    work: impl FnOnce() -> R + Send,
+    run: impl FnOnce(&mut (dyn FnMut() + Send)) -> T,
+) -> (R, T) {
+    let (mut work, mut result) = (Some(work), None);
+    let of_run = run(&mut || result = work.take().map(|work| work()));
+    (result.expect("the closure has run"), of_run)
+}
+
+/// Runs both closures, in parallel if there are several threads.
+fn join(a: &mut (dyn FnMut() + Send), b: &mut (dyn FnMut() + Send)) {
     #[cfg(feature = "rayon")]
-    return rayon::join(a, b);
+    rayon::join(a, b);
     #[cfg(not(feature = "rayon"))]
-    (a(), b())
+    {
+        a();
+        b();
+    }
+}
+
+/// Returns the number of threads of the current pool; without the feature `rayon`, 1.
+#[must_use]
+pub fn threads() -> usize {
+    #[cfg(feature = "rayon")]
+    return rayon::current_num_threads();
+    #[cfg(not(feature = "rayon"))]
+    1
 }
 
 /// Sorts values, which must be distinct.
@@ -319,7 +332,8 @@ pub fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R
     #[cfg(feature = "rayon")]
     if threads > 0 {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        return Ok(pool.or(Err(NoThreads))?.install(work));
+        let pool = pool.or(Err(NoThreads))?;
+        return Ok(by_reference(work, |work| pool.install(work)).0);
     }
     let _ = threads;
     Ok(in_pool(work))
@@ -330,10 +344,7 @@ pub fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R
 /// A loop that starts outside the pool wakes the threads of the pool and waits for them, which takes tens
 /// of microseconds. Work with several loops waits once.
 pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
-    #[cfg(feature = "rayon")]
-    return rayon::scope(|_| work());
-    #[cfg(not(feature = "rayon"))]
-    work()
+    both(work, || ()).0
 }
 
 /// Runs `work` as [`in_pool`] does, and keeps another thread of the pool awake meanwhile.

@@ -14,6 +14,21 @@ pub const WIDTH: usize = 16;
 /// Sixteen vectors, as one array of lanes for each coordinate.
 pub type Vectors<S> = [f32x16<S>; 3];
 
+/// Runs `f`, whose caller runs with the instruction set of `simd`. A build with debug assertions compiles `f`
+/// as a function of its own, others compile it as part of each caller.
+///
+/// For long code that many searches have in common: in the query library, copies of two such functions took
+/// half of the time that the compiler needed, and save 4 % of the instructions of a distance query.
+#[inline(always)]
+pub fn common<S: Simd, R>(simd: S, f: impl FnOnce() -> R) -> R {
+    if cfg!(debug_assertions) { alone(simd, f) } else { f() }
+}
+
+#[inline(never)]
+fn alone<S: Simd, R>(simd: S, f: impl FnOnce() -> R) -> R {
+    simd.vectorize(f)
+}
+
 /// Loads vectors from their coordinates.
 #[inline(always)]
 #[must_use]

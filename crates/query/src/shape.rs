@@ -12,6 +12,7 @@ use nearmiss_geometry::PointId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{PlaceVisitor, ScanArrays};
 use nearmiss_index::Skeleton;
+use nearmiss_lanes::parallel::change_runs;
 
 use crate::pair::placed::Placed;
 use crate::pair::shape_index::ShapeIndex;
@@ -80,18 +81,11 @@ impl Placed<'_> {
     /// of the longer one is ignored.
     pub fn touch_each(&self, shapes: &[Shape<'_>], answers: &mut [bool]) {
         /// Shapes per task of a thread: about 50 µs of work.
-        #[cfg(feature = "rayon")]
         const AT_ONCE: usize = 1024;
         let count = shapes.len().min(answers.len());
-        let (shapes, answers) = (&shapes[..count], &mut answers[..count]);
-        #[cfg(feature = "rayon")]
-        if shapes.len() > AT_ONCE {
-            use rayon::prelude::*;
-            let parts = shapes.par_chunks(AT_ONCE).zip(answers.par_chunks_mut(AT_ONCE));
-            parts.for_each(|(shapes, answers)| self.touch_in_turn(shapes, answers));
-            return;
-        }
-        self.touch_in_turn(shapes, answers);
+        change_runs(&mut answers[..count], AT_ONCE, |task, answers| {
+            self.touch_in_turn(&shapes[task * AT_ONCE..][..answers.len()], answers);
+        });
     }
 
     fn touch_in_turn(&self, shapes: &[Shape<'_>], answers: &mut [bool]) {

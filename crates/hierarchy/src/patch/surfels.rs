@@ -152,7 +152,7 @@ pub(crate) fn fits(
             let points = topology.points_of_leaf(number);
             let (positions, spacings) = (&positions[points.clone()], &spacings[points]);
             let look = |i: usize| spacings[i].look();
-            dispatch!(level, simd => fit(simd, index, positions, (look, gaps), scratch, found));
+            dispatch!(level, simd => fit(simd, index, positions, (&look, gaps), scratch, found));
         }
     });
     Ok(all)
@@ -175,7 +175,7 @@ pub(crate) fn fits_of(
             let points = topology.points_of_leaf(*number as usize);
             let (first, positions) = (points.start, &positions[points]);
             let look = |i: usize| looks(first + i);
-            dispatch!(level, simd => fit(simd, index, positions, (look, true), scratch, found));
+            dispatch!(level, simd => fit(simd, index, positions, (&look, true), scratch, found));
         }
     });
     all
@@ -349,7 +349,7 @@ fn fit<S: Simd>(
     simd: S,
     index: &Index<'_>,
     positions: &[[f32; 3]],
-    (look, gaps): (impl Fn(usize) -> Look, bool),
+    (look, gaps): (&dyn Fn(usize) -> Look, bool),
     scratch: &mut LeafScratch,
     found: &mut [Fit],
 ) {

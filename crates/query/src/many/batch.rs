@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
+use nearmiss_lanes::parallel::{self, change_each};
+
 use crate::ask::answer::Answer;
 use crate::ask::budget::Deadline;
 use crate::question::Scratch;
@@ -91,7 +93,7 @@ pub fn each<T: Send>(
     ask: impl Fn(usize, &mut Scratch) -> ControlFlow<T, T> + Sync,
 ) -> usize {
     let count = answers.len();
-    let threads = if count > 1 { threads() } else { 1 };
+    let threads = if count > 1 { parallel::threads() } else { 1 };
     let at_once = count.div_ceil(threads * TURNS).clamp(1, MOST_AT_ONCE);
     let workers = threads.min(count.div_ceil(at_once));
     if scratch.workers.len() < workers {
@@ -99,7 +101,7 @@ pub fn each<T: Send>(
     }
     let queue = Mutex::new(answers.chunks_mut(at_once).enumerate());
     let told = AtomicUsize::new(count);
-    let work = |scratch: &mut Scratch| {
+    let work = |_, scratch: &mut Scratch| {
         while !deadline.is_some_and(is_past) {
             let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
             let Some((turn, slots)) = next else { return };
@@ -119,30 +121,10 @@ pub fn each<T: Send>(
             }
         }
     };
-    run(&mut scratch.workers[..workers], work);
+    change_each(&mut scratch.workers[..workers], 1, work);
     told.into_inner()
 }
 
 fn is_past(deadline: Deadline) -> bool {
     deadline <= Deadline::within(Duration::ZERO)
-}
-
-#[cfg(feature = "rayon")]
-fn threads() -> usize {
-    rayon::current_num_threads()
-}
-
-#[cfg(not(feature = "rayon"))]
-const fn threads() -> usize {
-    1
-}
-
-/// Runs `work` for each worker; a single one runs on this thread.
-fn run(workers: &mut [Scratch], work: impl Fn(&mut Scratch) + Send + Sync) {
-    #[cfg(feature = "rayon")]
-    if workers.len() > 1 {
-        use rayon::prelude::*;
-        return workers.par_iter_mut().with_max_len(1).for_each(work);
-    }
-    workers.iter_mut().for_each(work);
 }

@@ -5,7 +5,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16};
 use nearmiss_hierarchy::{
     Comparison, Frontier, LaneNodes, MostUrgent, NodeBounds, NodePair, Open, PairVisitor, Part, Tree,
 };
-use nearmiss_lanes::wide::{repeated, spread};
+use nearmiss_lanes::wide::{common, repeated, spread};
 
 use crate::pair::relative_pose::{Gaps, LANES, Limits, RelativePose};
 
@@ -78,14 +78,24 @@ impl Bounds<'_> {
     pub(crate) fn of(&self, level: Level, pair: NodePair) -> Gaps {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.split(simd, pair, [true; 2], Limits::NONE).1,
+            || self.split_by(simd, pair, [true; 2], Limits::NONE).1,
         ))
     }
 
     /// Splits a node pair and computes the gaps of the resulting pairs. Nodes marked in `whole` are
     /// kept.
     #[inline(always)]
-    fn split<S: Simd>(
+    fn split<S: Simd>(&self, simd: S, pair: NodePair, whole: [bool; 2], limits: Limits) -> (Pairs, Gaps) {
+        common(
+            simd,
+            #[inline(always)]
+            || self.split_by(simd, pair, whole, limits),
+        )
+    }
+
+    /// Does the same as [`Self::split`], as part of the caller.
+    #[inline(always)]
+    fn split_by<S: Simd>(
         &self,
         simd: S,
         NodePair { a, b }: NodePair,
