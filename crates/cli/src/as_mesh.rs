@@ -1,7 +1,6 @@
 //! The option `--as-mesh` of commands about pairs: the inputs that are compared by their triangles.
 
 use clap::ValueEnum;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::error::CliError;
 
@@ -36,11 +35,4 @@ impl AsMeshName {
             self.word()
         )))
     }
-}
-
-/// Returns a parser of the names of one input, for commands that do not compare two meshes.
-pub(crate) fn one_of_two() -> impl TypedValueParser<Value = AsMeshName> {
-    let names = [AsMeshName::A, AsMeshName::B];
-    let values = PossibleValuesParser::new(names.iter().filter_map(ValueEnum::to_possible_value));
-    values.map(|name| if name == AsMeshName::A.word() { AsMeshName::A } else { AsMeshName::B })
 }

@@ -174,7 +174,8 @@ const SWEEP_EXAMPLES: &str = "\
 Examples, where each line of path.jsonl is {\"b\":[16 numbers]} or `x y z qx qy qz qw`:
   nearmiss sweep room.nm gripper.nm --path path.jsonl
   nearmiss sweep room.nm gripper.nm --path path.jsonl --clearance 0.02 --image sweep.png
-  nearmiss sweep room.nm gripper.nm --path path.jsonl --json";
+  nearmiss sweep room.nm gripper.obj --as-mesh b --path path.jsonl
+  nearmiss sweep cell.obj gripper.obj --as-mesh both --path path.jsonl --json";
 
 const TOUCH_EXAMPLE: &str = "\
 Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} for each shape:

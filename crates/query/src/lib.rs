@@ -78,4 +78,5 @@ pub use solid::plan::ShapePlan;
 pub use solid::ray::{Ray, RayAnswer, RayHit};
 pub use solid::shape::{Shape, SupportMap};
 pub use sweep::Sweep;
+pub use sweep::meshes::MeshSweep;
 pub use target::Target;

@@ -1,7 +1,8 @@
-//! Queries of two meshes: exact collision, all contacts, distance.
+//! Queries of two meshes: exact collision, all contacts, distance, motions.
 
 pub(crate) mod answer;
 pub(crate) mod collide;
+pub(crate) mod course;
 pub(crate) mod distance;
 pub(crate) mod foot;
 pub(crate) mod hint;
@@ -9,6 +10,7 @@ pub(crate) mod itself;
 pub(crate) mod mesh_pair;
 pub(crate) mod odds;
 pub(crate) mod pair;
+pub(crate) mod pairing;
 pub(crate) mod penetration;
 pub(crate) mod placed;
 pub(crate) mod prepared;

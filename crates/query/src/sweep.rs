@@ -1,5 +1,7 @@
 //! Two scans along their motions, and the question whether these are free.
 
+pub(crate) mod meshes;
+
 use crate::ask::budget::Budget;
 use crate::motion::advance::SweepScratch;
 use crate::motion::answer::SweepAnswer;

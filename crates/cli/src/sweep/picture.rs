@@ -1,24 +1,16 @@
 //! A picture of a sweep: b along its motion with the clearance as colour, and the clearance over
 //! time.
 
-use std::fmt::Display;
-use std::path::Path;
-
 use nearmiss::geometry::nalgebra::Vector3;
-use nearmiss::mesh::{self, SampleOptions, SamplePattern, SampleSize};
-use nearmiss::{
-    Budget, BuildOptions, DistanceOptions, Mesh, Motion, Moving, Placed, PointCloud, Pose, Prepared, Scan,
-    Scratch, SweepAnswer, SweepPlan, SweepVerdict, TriangleMesh,
-};
+use nearmiss::{Motion, Moving, Placed, Pose, Prepared, Scan, SweepAnswer, SweepPlan, SweepVerdict};
 use nearmiss_draw::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, blend};
 use nearmiss_draw::legend;
 use nearmiss_draw::marks::{frame, label, mark, title};
 use nearmiss_draw::picture::Picture;
 
 use super::report::time;
-use crate::bodies::Bodies;
+use super::swept::Swept;
 use crate::digits::short;
-use crate::error::CliError;
 use crate::path_plot::ticks;
 use crate::picture::{
     GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, SMALL, Style, dot, half_diagonal,
@@ -27,9 +19,6 @@ use crate::picture::{
 
 /// The number of intervals at whose ends the clearance is measured.
 const SAMPLES: u32 = 160;
-
-/// The number of points that show a mesh.
-const POINTS: u32 = 20_000;
 
 /// The side of the picture of the whole of a, if the view shows the motion alone.
 const INSET: usize = PANEL / 4;
@@ -67,24 +56,10 @@ struct Sample {
     centre: Vector3<f64>,
 }
 
-/// Returns points that are spread over a mesh, with which the picture shows it.
-pub(super) fn points_of(mesh: &Mesh, path: &Path) -> Result<Scan, CliError> {
-    let corrupt =
-        |cause: &dyn Display| CliError::CorruptScan { path: path.to_owned(), what: cause.to_string() };
-    let view = mesh.arrays();
-    let mesh = TriangleMesh::new(view.vertices.to_vec(), view.triangles.to_vec());
-    let spread = SampleOptions::new(SampleSize::Count(POINTS)).with_pattern(SamplePattern::BlueNoise);
-    let points = mesh::sample(&mesh.map_err(|cause| corrupt(&cause))?, &spread)
-        .map_err(|cause| CliError::Sample { path: path.to_owned(), cause })?;
-    let cloud = PointCloud::from_positions(&points).map_err(|cause| corrupt(&cause))?;
-    Scan::build(&cloud, &BuildOptions::default())
-        .map_err(|cause| CliError::Build { path: path.to_owned(), cause })
-}
-
 /// Paints b along its motion as seen from a, and a plot of the clearance beside it. `shown` are the scans,
-/// and the points of a mesh.
+/// and the points of meshes.
 pub(super) fn paint(
-    (bodies, shown, motions): (&Bodies, [&Scan; 2], &[Motion; 2]),
+    (swept, shown, motions): (&Swept, &[Scan; 2], &[Motion; 2]),
     plan: &SweepPlan,
     answer: &SweepAnswer,
     style: &Style,
@@ -93,7 +68,7 @@ pub(super) fn paint(
     let key = key_time(answer);
     let moving = [shown[0].along(&motions[0]), shown[1].along(&motions[1])];
     let a = moving[0].at(key);
-    let samples = sample(bodies, &moving, plan, key);
+    let samples = sample(swept, &moving, plan, key);
     let highest =
         samples.iter().map(|sample| sample.upper).filter(|upper| upper.is_finite()).fold(0.0, f64::max);
     let area = Area { left: GAP, top: GAP, width: PANEL, height: PANEL };
@@ -157,20 +132,20 @@ fn nearest<'s>(samples: &'s [Sample], key: f64, answer: &SweepAnswer) -> Option<
 }
 
 /// Measures the clearance at evenly spaced times.
-fn sample(bodies: &Bodies, moving: &[Moving<'_>; 2], plan: &SweepPlan, key: f64) -> Vec<Sample> {
+fn sample(swept: &Swept, moving: &[Moving<'_>; 2], plan: &SweepPlan, key: f64) -> Vec<Sample> {
     let [a, b] = moving;
     let duration = a.motion().duration().max(b.motion().duration());
     let count = if duration > 0.0 { SAMPLES } else { 0 };
-    let options = DistanceOptions::default().with_semantics(plan.options().semantics);
-    let (plan, first_b) = (bodies.distance_plan(&options).ok(), b.at(0.0));
+    let first_b = b.at(0.0);
     let to_key = |time: f64| a.motion().at(key).after(&a.motion().at(time).inverse());
-    let mut scratch = Scratch::default();
-    (0..=count)
-        .map(|i| {
-            let time = duration * f64::from(i) / f64::from(count.max(1));
-            let views = bodies.at(&[a, b].map(|moving| moving.motion().at(time)));
-            let found = plan.as_ref().map(|plan| views.distance(plan, &Budget::UNLIMITED, &mut scratch));
-            let [lower, upper] = found.map_or([0.0, f64::INFINITY], |found| [found.lower, found.upper]);
+    let times: Vec<f64> = (0..=count).map(|i| duration * f64::from(i) / f64::from(count.max(1))).collect();
+    let poses: Vec<[Pose; 2]> =
+        times.iter().map(|&time| [a, b].map(|moving| moving.motion().at(time))).collect();
+    let distances = swept.distances(&poses, plan);
+    times
+        .into_iter()
+        .zip(distances)
+        .map(|(time, [lower, upper])| {
             let pose = to_key(time).after(&b.motion().at(time));
             let placed = Placed::new(first_b.scan(), &pose);
             let centre = placed.stored_to_world().apply(first_b.scan().outline().discs.centre);

@@ -102,8 +102,14 @@ impl Report {
         }
     }
 
-    /// The answer as a sentence. `unit` is the length to which places are rounded.
-    pub(super) fn sentence(&self, answer: &SweepAnswer, wanted: f64, unit: f64) -> String {
+    /// The answer as a sentence. `wanted` is the clearance that was asked for, `unit` the length to which
+    /// places are rounded. `are_meshes` if both are meshes.
+    pub(super) fn sentence(
+        &self,
+        answer: &SweepAnswer,
+        (wanted, unit): (f64, f64),
+        are_meshes: bool,
+    ) -> String {
         let within =
             if wanted > 0.0 { format!(" within {} of each other", short(wanted)) } else { String::new() };
         let free_to = |t: f64| match t > 0.0 {
@@ -153,9 +159,9 @@ impl Report {
             SweepVerdict::Undecided { t_free, reason } => {
                 let why = match reason {
                     SweepReason::Near => format!(
-                        "from t = {} on they come nearer than can be proven apart (about two local spacings of {}), but \
-                         no contact was found",
+                        "from t = {} on they come nearer than can be proven apart (about {}{}), but no contact was found",
                         time_down(t_free),
+                        if are_meshes { "" } else { "two local spacings of " },
                         rough(answer.band)
                     ),
                     SweepReason::Budget => "the budget ran out; raise --budget or --work".to_owned(),

@@ -110,6 +110,38 @@ fn a_picture_shows_a_mesh_as_a_scan_of_it() {
 }
 
 #[test]
+fn two_meshes_are_swept_by_their_triangles() {
+    let place = cubes();
+    place.write("into.txt", "6 0.1 0 0 0 0 1\n-6 0.1 0 0 0 0 1\n");
+    place.write("past.txt", "6 3 0 0 0 0 1\n-6 3 0 0 0 0 1\n");
+    let ask = |b: &str, path: &str, more: &[&str]| {
+        let args = ["sweep", "cube.obj", b, "--as-mesh", "both", "--path", path];
+        place.ok(&[&args[..], more].concat())
+    };
+    let told = ask("cube.obj", "past.txt", &["--json"]).json().remove(0);
+    assert_eq!((&told["verdict"], &told["evidence"]), (&"free".into(), &"certified".into()), "{told}");
+    let [kept, upper] = ["clearance", "clearance_upper"].map(|key| told[key].as_f64().unwrap());
+    assert!(kept > 0.7 && kept <= 1.0 && (1.0..1.1).contains(&upper), "{told}");
+    for b in ["cube.obj", "cube.nm"] {
+        let told = ask(b, "into.txt", &["--json", "--image", "sweep.png"]).json().remove(0);
+        let [free, hit, band] = ["t_free", "t_hit", "band"].map(|key| told[key].as_f64().unwrap());
+        // Their edges are 2 long.
+        let (exact, off) = ((6.0 - 2.0) / 12.0, band / 12.0);
+        assert!(free <= exact && exact - free < off && (hit - exact).abs() < off, "{told}");
+        assert_eq!(told["evidence"], "certified", "{told}");
+        let (wide, pixels) = place.picture("sweep.png");
+        let painted = pixels.chunks(3).filter(|p| p.iter().any(|&c| c < 200)).count();
+        assert!(wide > 1000 && painted > 5000, "{painted} pixels");
+    }
+    let people = ask("cube.nm", "into.txt", &["--clearance", "0.5"]).results;
+    assert!(people.starts_with("They come within 0.5 of each other at t = "), "{people}");
+    let args = ["sweep", "cube.obj", "cube.obj", "--path", "into.txt", "--as-mesh", "both"];
+    for more in [&["--thickened", "0.1"][..], &["--surface-only"], &["--kernel", "euclidean"]] {
+        place.refused(2, &[&args[..], more].concat(), &["two meshes", more[0]]);
+    }
+}
+
+#[test]
 fn paths_that_are_no_motion_are_refused_with_their_line() {
     let place = place();
     place.write("grows.txt", "1 0 0 3 0 1 0 0 0 0 1 0 0 0 0 1\n2 0 0 3 0 2 0 0 0 0 2 0 0 0 0 1\n");

@@ -53,11 +53,11 @@ fn brute_force(a: &Placed<'_>, b: &Placed<'_>) -> [f64; 3] {
     let mut bounds = [f64::INFINITY; 3];
     for (p, ball_p, within_p) in &of_a {
         for (q, ball_q, within_q) in &of_b {
-            let away = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
-            let own = [away - within_p - within_q, away - ball_p - ball_q, away];
-            for (bound, own) in bounds.iter_mut().zip(own) {
-                *bound = bound.min(own);
-            }
+            let [x, y, z] = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+            let away = (x * x + y * y + z * z).sqrt();
+            bounds[0] = bounds[0].min(away - within_p - within_q);
+            bounds[1] = bounds[1].min(away - ball_p - ball_q);
+            bounds[2] = bounds[2].min(away);
         }
     }
     bounds

@@ -3,14 +3,13 @@
 use std::ops::ControlFlow;
 
 use nearmiss_hierarchy::{NodePair, Open, PairVisitor, Part, resume};
-use nearmiss_lanes::wide::Bits;
 use nearmiss_mesh::triangle_distance;
 use serde::{Deserialize, Serialize};
 
 use crate::ask::answer::Statistics;
 use crate::distance::{Frontier, Nearness};
 use crate::mesh::hint::MeshHint;
-use crate::mesh::mesh_pair::MeshPairing;
+use crate::mesh::mesh_pair::{EXACT, MeshPairing};
 use crate::pair::bounds::{BoundVisitor, Bounds};
 use crate::pair::relative_pose::{Limits, RelativePose};
 
@@ -30,9 +29,6 @@ pub struct MeshDistance {
     /// The cost of the query.
     pub statistics: Statistics,
 }
-
-/// The cost of an exact distance of two triangles, in node pairs.
-const EXACT: u64 = 64;
 
 /// The nearest triangles so far.
 #[derive(Debug, Clone, Copy)]
@@ -81,17 +77,16 @@ impl PairVisitor<Nearness> for Search<'_, '_> {
     fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open<Nearness>) -> ControlFlow<()> {
         let bounds = self.pair.least_distances(leaves);
         let to_world = self.pair.meshes[0].stored_to_world().scale();
-        let mut open = self.pair.lanes(leaves);
-        // The least bound first: the others may then be out of reach.
-        while let Some(lane) = Bits(open).min_by(|&i, &j| bounds[i].total_cmp(&bounds[j])) {
-            if f64::from(bounds[lane]) * to_world * (1.0 - 1e-9) >= self.best.distance {
-                break;
-            }
-            open &= !(1 << lane);
-            self.compare(MeshPairing::triangles(leaves, lane));
-            if self.best.distance == 0.0 {
+        let lanes = self.pair.lanes(leaves);
+        let _all = MeshPairing::by_bound(leaves, (&bounds, lanes), |bound, triangles| {
+            if f64::from(bound) * to_world * (1.0 - 1e-9) >= self.best.distance {
                 return ControlFlow::Break(());
             }
+            self.compare(triangles);
+            ControlFlow::Continue(())
+        });
+        if self.best.distance == 0.0 {
+            return ControlFlow::Break(());
         }
         self.pair.meter.go_on()
     }

@@ -1,10 +1,12 @@
 //! Two prepared meshes under a relative pose, and the cost of a search.
 
 use std::cell::OnceCell;
+use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{LEAF_TRIANGLES, MeshView, Relative, TreePair};
+use nearmiss_lanes::wide::Bits;
 use nearmiss_mesh::Corners;
 
 use crate::ask::budget::Budget;
@@ -18,6 +20,12 @@ use crate::pair::relative_pose::RelativePose;
 
 /// The cost of a leaf pair, in node pairs.
 const LEAF_PAIR: u64 = 16;
+
+/// The share of the radius of the smaller mesh up to which motions are resolved.
+const RESOLVED: f64 = 1e-3;
+
+/// The cost of an exact distance of two triangles, in node pairs.
+pub(crate) const EXACT: u64 = 64;
 
 /// Two placed meshes, their arrays, the relative pose, and the cost of the search.
 #[derive(Debug)]
@@ -116,6 +124,14 @@ impl<'a> MeshPairing<'a> {
         TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach: relative.slack() }
     }
 
+    /// The way up to which motions are resolved, in the world: a share of the radius of the smaller mesh.
+    pub(crate) fn band(&self) -> f64 {
+        let radius = |placed: &PlacedMesh<'_>, mesh: &MeshView<'_>| {
+            mesh.ball.radius * placed.stored_to_world().scale()
+        };
+        RESOLVED * radius(&self.meshes[0], self.a).min(radius(&self.meshes[1], self.b))
+    }
+
     /// Prepares the relative pose for bounds of distances.
     pub(crate) fn relative_pose(&self) -> RelativePose {
         let roots = [self.a, self.b].map(|mesh| mesh.tree.root_box());
@@ -158,6 +174,22 @@ impl<'a> MeshPairing<'a> {
     #[inline]
     pub(crate) fn triangles([a, b]: [usize; 2], lane: usize) -> [usize; 2] {
         [a * LEAF_TRIANGLES + lane % LEAF_TRIANGLES, b * LEAF_TRIANGLES + lane / LEAF_TRIANGLES]
+    }
+
+    /// Calls `visit` with the triangles in some lanes of two leaves until it breaks, the least of the
+    /// `bounds` of their distances first: the others may then be out of reach.
+    #[inline]
+    pub(crate) fn by_bound(
+        leaves: [usize; 2],
+        (bounds, lanes): (&[f32; LEAF_TRIANGLES * LEAF_TRIANGLES], u32),
+        mut visit: impl FnMut(f32, [usize; 2]) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut open = lanes;
+        while let Some(lane) = Bits(open).min_by(|&i, &j| bounds[i].total_cmp(&bounds[j])) {
+            open &= !(1 << lane);
+            visit(bounds[lane], Self::triangles(leaves, lane))?;
+        }
+        ControlFlow::Continue(())
     }
 
     /// The contact of two triangles in the world; `None` if they do not meet.

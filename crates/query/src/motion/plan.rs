@@ -91,6 +91,22 @@ impl SweepPlan {
         Self::new(options, scan, scan)
     }
 
+    /// Validates `options` for two meshes, of which only the clearance counts: triangles have one meaning.
+    ///
+    /// # Errors
+    /// Returns [`PlanError::Margin`] for a negative or non-finite clearance.
+    pub fn of_meshes(options: &SweepOptions) -> Result<Self, PlanError> {
+        let options = SweepOptions::default().with_clearance(options.clearance);
+        Self::of_metric(&options, Metric::Euclidean).map(|plan| plan.between_meshes())
+    }
+
+    /// The plan with the meaning of meshes, with which everything can be proven.
+    pub(crate) fn between_meshes(&self) -> Self {
+        let options =
+            SweepOptions { semantics: Semantics::Surface, metric: Some(Metric::Euclidean), ..self.options };
+        Self { options, ..*self }
+    }
+
     /// The options that were validated, with the metric of the scans.
     #[must_use]
     pub fn options(&self) -> &SweepOptions {

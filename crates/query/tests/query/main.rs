@@ -18,6 +18,7 @@ mod margin;
 mod mesh_clashes;
 mod mesh_scan_penetration;
 mod mesh_scans;
+mod mesh_sweeps;
 mod mesh_worlds;
 mod meshes;
 mod moments;

@@ -84,7 +84,7 @@ fn check(meshes: &[TriangleMesh; 2], poses: &[Pose; 2]) -> bool {
 }
 
 /// Triangles anywhere within `half`, of about `size`.
-fn soup(rng: &mut Random, count: u32, half: f64, size: f64, origin: [f64; 3]) -> TriangleMesh {
+pub(crate) fn soup(rng: &mut Random, count: u32, half: f64, size: f64, origin: [f64; 3]) -> TriangleMesh {
     let mut vertices = Vec::new();
     for _ in 0..count {
         let place = point_in(rng, half);
