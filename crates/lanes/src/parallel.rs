@@ -63,7 +63,7 @@ fn collected<R: Send, I: Iterator<Item = R>>(
 ) -> Vec<R> {
     let mut all = Vec::with_capacity(count);
     let slots: &mut [MaybeUninit<R>] = &mut all.spare_capacity_mut()[..count];
-    divided(0..count, at_once, runs(slots, 1), &|range, part: Runs<'_, MaybeUninit<R>>| {
+    change_together(0..count, at_once, runs(slots, 1), &|range, part: Runs<'_, MaybeUninit<R>>| {
         let mut results = f(range);
         for slot in part.elements {
             slot.write(results.next().expect("a result for each number"));
@@ -153,7 +153,7 @@ pub fn fill_with<S: Send, T: Send>(
     // Few items at once if there are not many, so that threads finish at nearly the same time.
     let at_once = (count / PIECES).clamp(1, 16);
     let pool = Mutex::new(Vec::new());
-    divided(0..count, at_once, runs(out, each), &|items, part: Runs<'_, T>| {
+    change_together(0..count, at_once, runs(out, each), &|items, part: Runs<'_, T>| {
         f(Lent::new(&pool, &scratch).scratch(), items, part.elements);
     });
 }
@@ -181,7 +181,7 @@ fn change_runs_by<T: Send>(
     f: impl Fn(usize, &mut [T]) + Sync + Send,
 ) {
     let count = out.len().div_ceil(length);
-    divided(0..count, at_once, runs(out, length), &|numbers, part: Runs<'_, T>| {
+    change_together(0..count, at_once, runs(out, length), &|numbers, part: Runs<'_, T>| {
         numbers.zip(part.elements.chunks_mut(length)).for_each(|(number, run)| f(number, run));
     });
 }
@@ -189,7 +189,7 @@ fn change_runs_by<T: Send>(
 /// Passes every item and its index to `f`, which changes it in place. A thread takes at least
 /// `at_once` items.
 pub fn change_each<T: Send>(all: &mut [T], at_once: usize, f: impl Fn(usize, &mut T) + Sync + Send) {
-    divided(0..all.len(), at_once, runs(all, 1), &|range, part: Runs<'_, T>| {
+    change_together(0..all.len(), at_once, runs(all, 1), &|range, part: Runs<'_, T>| {
         range.zip(part.elements).for_each(|(i, one)| f(i, one));
     });
 }
@@ -203,9 +203,14 @@ pub fn change_both<A: Send, B: Send>(
     f: impl Fn(usize, &mut A, &mut B) + Sync + Send,
 ) {
     let count = a.len().min(b.len());
-    divided(0..count, at_once, (runs(a, 1), runs(b, 1)), &|range, (a, b): (Runs<'_, A>, Runs<'_, B>)| {
-        range.zip(a.elements).zip(b.elements).for_each(|((i, a), b)| f(i, a, b));
-    });
+    change_together(
+        0..count,
+        at_once,
+        (runs(a, 1), runs(b, 1)),
+        &|range, (a, b): (Runs<'_, A>, Runs<'_, B>)| {
+            range.zip(a.elements).zip(b.elements).for_each(|((i, a), b)| f(i, a, b));
+        },
+    );
 }
 
 /// Parts of arrays that belong to the same items, and can be divided between threads.
@@ -253,19 +258,14 @@ divide_tuples!(A 0, B 1, C 2, D 3, E 4, F 5);
 /// Passes ranges of `items` with the `parts` of several arrays that belong to them to `f`, which changes
 /// these. Ranges have `at_once` items, the last may have fewer.
 ///
-/// One loop over several arrays reads each of them once, while it is in the cache.
+/// One loop over several arrays reads each of them once, while it is in the cache. The closure is no type
+/// parameter, so that the loop is compiled once for each kind of array.
 pub fn change_together<P: Divide>(
     items: Range<usize>,
     at_once: usize,
     parts: P,
-    f: &(impl Fn(Range<usize>, P) + Sync + Send),
+    f: &(dyn Fn(Range<usize>, P) + Sync),
 ) {
-    divided(items, at_once, parts, f);
-}
-
-/// The loop of all others. The closure is no type parameter, so that it is compiled once for each kind of
-/// array.
-fn divided<P: Divide>(items: Range<usize>, at_once: usize, parts: P, f: &(dyn Fn(Range<usize>, P) + Sync)) {
     let at_once = at_once.max(1);
     if items.len() <= at_once {
         return f(items, parts);
@@ -273,7 +273,10 @@ fn divided<P: Divide>(items: Range<usize>, at_once: usize, parts: P, f: &(dyn Fn
     let half = items.len().div_ceil(at_once) / 2 * at_once;
     let middle = items.start + half;
     let (left, right) = parts.divide(half);
-    both(|| divided(items.start..middle, at_once, left, f), || divided(middle..items.end, at_once, right, f));
+    both(
+        || change_together(items.start..middle, at_once, left, f),
+        || change_together(middle..items.end, at_once, right, f),
+    );
 }
 
 /// Runs both closures, in parallel if there are several threads, and returns both results.
@@ -344,7 +347,10 @@ pub fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R
 /// A loop that starts outside the pool wakes the threads of the pool and waits for them, which takes tens
 /// of microseconds. Work with several loops waits once.
 pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
-    both(work, || ()).0
+    #[cfg(feature = "rayon")]
+    return by_reference(work, |work| rayon::scope(|_| work())).0;
+    #[cfg(not(feature = "rayon"))]
+    work()
 }
 
 /// Runs `work` as [`in_pool`] does, and keeps another thread of the pool awake meanwhile.

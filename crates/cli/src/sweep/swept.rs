@@ -5,9 +5,9 @@ use std::path::Path;
 
 use nearmiss::mesh::{self, SampleOptions, SamplePattern, SampleSize};
 use nearmiss::{
-    Budget, BuildOptions, DistanceOptions, DistancePlan, Mesh, MeshScanSweep, MeshSweep, Motion, PlanError,
-    PointCloud, Pose, Prepared, Scan, Scratch, Sweep, SweepAnswer, SweepOptions, SweepPlan, SweepVerdict,
-    TriangleMesh,
+    Budget, BuildOptions, DistanceOptions, DistancePlan, Mesh, MeshScanSweep, MeshScratch, MeshSweep, Motion,
+    PlanError, PointCloud, Pose, Prepared, Scan, Scratch, Sweep, SweepAnswer, SweepOptions, SweepPlan,
+    SweepVerdict, TriangleMesh,
 };
 
 use super::args::SweepArgs;
@@ -132,7 +132,7 @@ impl Swept {
                 poses.iter().map(distance).collect()
             }
             Self::Meshes(meshes) => {
-                let mut scratch = nearmiss::MeshScratch::default();
+                let mut scratch = MeshScratch::default();
                 let distance = |poses: &[Pose; 2]| {
                     let found = meshes.pair(poses, now()).distance(&mut scratch);
                     [found.lower, found.upper]

@@ -12,7 +12,6 @@ use nearmiss_mesh::{TriangleDistance, triangle_distance, unit_normal};
 use crate::ask::answer::{Answer, Contact, Evidence, Reason, Verdict};
 use crate::ask::budget::Budget;
 use crate::contact::collide::ContactScratch;
-
 use crate::distance::{Distance, Frontier, unknown};
 use crate::mesh::distance::distance;
 use crate::mesh::hint::MeshHint;
@@ -20,6 +19,7 @@ use crate::mesh::mesh_pair::{EXACT, MeshPairing};
 use crate::mesh::placed::PlacedMesh;
 use crate::motion::course::{Course, Look};
 use crate::motion::plan::SweepPlan;
+use crate::pair::pairing::Pairing;
 
 /// Two meshes that move.
 pub(crate) struct MovingMeshes<'a> {
@@ -120,7 +120,7 @@ impl<'a> Within<'a> {
             ControlFlow::Continue(())
         } else {
             #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
-            let reach = (most / search.to_world() * (1.0 + 1e-6)) as f32 + relative.slack();
+            let reach = (most / search.pair.to_world() * (1.0 + 1e-6)) as f32 + relative.slack();
             let trees = TreePair { reach, ..search.pair.trees(&relative) };
             descend(trees, level, &mut Plunging::new(stack), &mut search)
         };
@@ -135,12 +135,12 @@ impl<'a> Within<'a> {
         Answer { verdict, band, distance_estimate: None, statistics: search.pair.meter.spent }
     }
 
-    fn to_world(&self) -> f64 {
-        self.pair.meshes[0].stored_to_world().scale()
-    }
-
     /// The contact midway between two triangles.
-    fn contact(&self, TriangleDistance { points, .. }: TriangleDistance, triangles: [usize; 2]) -> Contact {
+    fn contact(
+        &self,
+        TriangleDistance { points, distance }: TriangleDistance,
+        triangles: [usize; 2],
+    ) -> Contact {
         if let Some(contact) = self.pair.contact(triangles) {
             return Contact::from(&contact);
         }
@@ -150,7 +150,7 @@ impl<'a> Within<'a> {
         Contact {
             point: [0, 1, 2].map(|k| 0.5 * p[k] + 0.5 * q[k]),
             normals: Some(corners.map(|corners| pose.rotate(unit_normal(&corners).unwrap_or_default()))),
-            residual: 0.5 * (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt(),
+            residual: 0.5 * pose.scale() * distance,
             sources: [PointId(self.pair.a.source[triangles[0]]), PointId(self.pair.b.source[triangles[1]])],
         }
     }
@@ -165,7 +165,7 @@ impl PairVisitor for Within<'_> {
 
     fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open) -> ControlFlow<()> {
         let (bounds, lanes, to_world) =
-            (self.pair.least_distances(leaves), self.pair.lanes(leaves), self.to_world());
+            (self.pair.least_distances(leaves), self.pair.lanes(leaves), self.pair.to_world());
         let _all = MeshPairing::by_bound(leaves, (&bounds, lanes), |bound, triangles| {
             let bound = f64::from(bound) * to_world * (1.0 - 1e-9);
             if bound > self.most {
@@ -192,7 +192,7 @@ impl BoxVisitor for Within<'_> {
 
     #[inline]
     fn least_apart(&mut self, least: f32) {
-        let least = f64::from(least - self.pair.relative.slack()) * self.to_world() * (1.0 - 1e-6);
+        let least = f64::from(least - self.pair.relative.slack()) * self.pair.to_world() * (1.0 - 1e-6);
         self.apart = self.apart.min(least);
     }
 }

@@ -97,7 +97,7 @@ impl SweepPlan {
     /// Returns [`PlanError::Margin`] for a negative or non-finite clearance.
     pub fn of_meshes(options: &SweepOptions) -> Result<Self, PlanError> {
         let options = SweepOptions::default().with_clearance(options.clearance);
-        Self::of_metric(&options, Metric::Euclidean).map(|plan| plan.between_meshes())
+        Self::of_metric(&options, Metric::Euclidean)
     }
 
     /// The plan with the meaning of meshes, with which everything can be proven.
