@@ -43,7 +43,7 @@ pub use scan::intake::{GatheredPoints, IntakeError, PointGatherer};
 pub use scan::options::{BuildError, BuildOptions};
 pub use scan::outline::{Ball, Outline};
 pub use scan::points::ScanPoints;
-pub use scan::ray_boxes::RayBoxes;
+pub use scan::ray_boxes::ray_boxes;
 pub use scan::refit::Refitted;
 pub use scan::survey::SamplingSurvey;
 pub use tree::topology::{Children, Grandchildren, LaneNodes, MOST_LEAF_POINTS, NodePair, Topology};

@@ -10,5 +10,5 @@ pub use cubes::Cubes;
 pub use fearless_simd::Level;
 pub use tree::{
     BlockBoxes, BlockGrid, BlockTree, BoxRay, BoxTree, Cones, Nearest, Neighbour, Overlaps, RayBox,
-    RayVisitor, Skeleton,
+    RayVisitor, Skeleton, Slab,
 };

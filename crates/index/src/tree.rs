@@ -24,7 +24,7 @@ pub use cells::BlockGrid;
 pub use cones::Cones;
 pub use nearest::{Nearest, Neighbour};
 pub use overlaps::Overlaps;
-pub use rays::{BoxRay, BoxTree, RayBox, RayVisitor};
+pub use rays::{BoxRay, BoxTree, RayBox, RayVisitor, Slab};
 pub use skeleton::Skeleton;
 
 use std::convert::Infallible;

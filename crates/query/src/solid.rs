@@ -17,6 +17,7 @@ pub(crate) mod gather;
 pub(crate) mod hint;
 pub(crate) mod inner;
 pub(crate) mod lanes;
+pub(crate) mod lowest;
 pub(crate) mod meeting;
 pub(crate) mod overlap;
 pub(crate) mod place;

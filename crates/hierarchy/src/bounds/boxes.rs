@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_index::RayBox;
+use nearmiss_index::{RayBox, Slab};
 use nearmiss_lanes::vector::{cross, dot, sub};
 use serde::{Deserialize, Serialize};
 
@@ -54,19 +54,23 @@ impl OrientedBox {
         [-1.0, 1.0].map(|sign| [0, 1, 2].map(|k| f64::from(self.centre[k]) + sign * 1.000_001 * half[k]))
     }
 
-    /// The upright box about this one, and the slab between the two faces that are nearest to each other.
+    /// The upright box about this one, and the three slabs that it is the common part of, the thinnest first.
     #[expect(clippy::cast_possible_truncation, reason = "rounded outwards")]
     pub(crate) fn for_rays(&self) -> RayBox {
         let [min, max] = self.upright();
-        let thin = (0..3).min_by(|a, b| self.half[*a].total_cmp(&self.half[*b])).unwrap_or(0);
-        let normal = self.axes[thin];
-        let middle: f64 = (0..3).map(|k| f64::from(normal[k]) * f64::from(self.centre[k])).sum();
-        let half = 1.000_001 * f64::from(self.half[thin]);
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| self.half[a].total_cmp(&self.half[b]));
+        let slab = |k: usize| {
+            let normal = self.axes[k];
+            let middle: f64 = (0..3).map(|j| f64::from(normal[j]) * f64::from(self.centre[j])).sum();
+            let half = 1.000_001 * f64::from(self.half[k]);
+            let between = [((middle - half) as f32).next_down(), ((middle + half) as f32).next_up()];
+            Slab { normal, between }
+        };
         RayBox {
             min: min.map(|c| (c as f32).next_down()),
             max: max.map(|c| (c as f32).next_up()),
-            normal,
-            between: [((middle - half) as f32).next_down(), ((middle + half) as f32).next_up()],
+            slabs: order.map(slab),
         }
     }
 

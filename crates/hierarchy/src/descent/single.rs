@@ -41,6 +41,13 @@ pub trait PlaceVisitor {
         least_sq <= self.most_sq()
     }
 
+    /// Called with the number of a leaf that is near, before other nodes are visited: for a leaf that is
+    /// not in the cache, a good time to load it.
+    #[inline(always)]
+    fn foresee(&self, number: usize) {
+        let _ = number;
+    }
+
     /// Visits a leaf, by its number, whose box is near. May end the descent.
     fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()>;
 }
@@ -127,6 +134,9 @@ impl Tree<'_> {
                 let lane = left.trailing_zeros() as usize;
                 left &= left - 1;
                 let (own, child) = (distances[lane % FAN], children.lanes()[lane % FAN]);
+                if topology.is_leaf(child) {
+                    visitor.foresee(topology.leaf_number(child));
+                }
                 // Nearest on top.
                 let mut at = top;
                 while at > bottom && stack[at - 1].0 < own {

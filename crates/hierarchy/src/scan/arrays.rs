@@ -115,6 +115,19 @@ impl ScanArrays<'_> {
         }
     }
 
+    /// Asks the processor to load the positions and normals of the points of a leaf from `first` on, of up
+    /// to sixteen.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    #[inline(always)]
+    pub fn prefetch_points(&self, first: usize) {
+        prefetch(&self.blocks[first / PointBlock::WIDTH].position);
+        if let Some(normals) = self.normals[first..].first_chunk::<{ PointBlock::WIDTH }>() {
+            prefetch(normals);
+        }
+    }
+
     /// Returns the radius of the ball that represents a point in the obstacle: half the local
     /// radius of a sparse point, about a third of that of other points off sheets, zero for points
     /// on sheets.

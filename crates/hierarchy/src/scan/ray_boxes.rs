@@ -2,32 +2,17 @@
 
 use nearmiss_geometry::NodeId;
 use nearmiss_index::BoxTree;
-use nearmiss_lanes::parallel::map;
 
-use crate::bounds::boxes::OrientedBox;
+use crate::bounds::part::Part;
 use crate::scan::arrays::ScanArrays;
 
-/// Boxes around the leaves' parts of the obstacle, for rays.
-#[derive(Debug)]
-pub struct RayBoxes {
-    /// Upright boxes, cut by a slab.
-    pub tree: BoxTree,
-    /// The enclosures, by the number of the leaf.
-    pub enclosures: Vec<OrientedBox>,
-}
-
-impl RayBoxes {
-    /// Bounds the leaves of a scan. `None` if an enclosure is unbounded. O(n log n) for n leaves.
-    #[must_use]
-    pub fn new(scan: &ScanArrays<'_>) -> Option<Self> {
-        let topology = scan.tree.topology;
-        let root = scan.obstacle_enclosure(NodeId::ROOT.index()).upright();
-        if !root.iter().flatten().all(|c| c.is_finite()) {
-            return None;
-        }
-        let enclosure = |number: usize| scan.obstacle_enclosure(topology.leaf(number).index());
-        let enclosures = map(topology.leaves(), enclosure);
-        let tree = BoxTree::new(enclosures.len(), |number| enclosures[number].for_rays());
-        Some(Self { tree, enclosures })
-    }
+/// Returns a tree over the enclosures of the leaves' parts of the obstacle, by the number of the leaf. `None`
+/// if an enclosure is unbounded. O(n log n) for n leaves.
+#[must_use]
+pub fn ray_boxes(scan: &ScanArrays<'_>) -> Option<BoxTree> {
+    let (tree, leaves) = (&scan.tree, scan.tree.topology.leaves());
+    let root = tree.enclosure(Part::Obstacle, NodeId::ROOT).upright();
+    let is_bounded = root.iter().flatten().all(|c| c.is_finite());
+    let enclosure = |number| tree.enclosure(Part::Obstacle, tree.topology.leaf(number));
+    is_bounded.then(|| BoxTree::new(leaves, |number| enclosure(number).for_rays()))
 }

@@ -14,18 +14,21 @@ use super::{Boxes, fill_above, levels};
 /// The least component of a direction by which lengths are divided.
 const LEAST: f32 = 1e-12;
 
+/// The number of slabs that cut a box.
+const SLABS: usize = 3;
+
 /// A tree over boxes, sixteen to a group, for rays.
 ///
-/// Every box is upright, and cut by a slab: the space between two parallel planes. The tree is packed: all
-/// groups are full but the last ones, and boxes of a group are close (Leutenegger, Lopez and Edgington 1997;
-/// here the longest axis is halved until a group is left).
+/// Every box is upright, and cut by three slabs: a slab is the space between two parallel planes. The tree is
+/// packed: all groups are full but the last ones, and boxes of a group are close (Leutenegger, Lopez and
+/// Edgington 1997; here the longest axis is halved until a group is left).
 #[derive(Debug)]
 pub struct BoxTree {
     /// The number of each box, in the order of the tree.
     numbers: Vec<u32>,
     levels: Vec<Room<Boxes>>,
     /// The slabs of the boxes of each group of the first level.
-    slabs: Vec<Slabs>,
+    slabs: Vec<[Slabs; SLABS]>,
 }
 
 /// A box of a [`BoxTree`].
@@ -35,7 +38,15 @@ pub struct RayBox {
     pub min: [f32; 3],
     /// The greatest corner.
     pub max: [f32; 3],
-    /// The unit normal of the slab.
+    /// The slabs that cut it. A search compares them in this order, and takes least if the first ones exclude
+    /// most rays.
+    pub slabs: [Slab; SLABS],
+}
+
+/// The space between two parallel planes.
+#[derive(Debug, Clone, Copy)]
+pub struct Slab {
+    /// The unit normal.
     pub normal: [f32; 3],
     /// The least and the greatest product of the normal and a position in the slab.
     pub between: [f32; 2],
@@ -137,16 +148,20 @@ impl BoxTree {
         let empty = |groups| Ok::<_, std::convert::Infallible>(vec![Boxes::EMPTY; groups].into());
         let mut levels = levels(count, empty).unwrap_or_else(|never| match never {});
         let none = Slabs { normal: [[0.0; WIDTH]; 3], between: [[0.0; WIDTH]; 2] };
-        let mut slabs = vec![none; count.div_ceil(WIDTH)];
+        let mut slabs = vec![[none; SLABS]; count.div_ceil(WIDTH)];
         if let Some((first, above)) = levels.split_first_mut() {
             for (place, &number) in numbers.iter().enumerate() {
                 let (group, lane, own) = (place / WIDTH, place % WIDTH, &boxes[number as usize]);
                 let (boxes, slabs) = (&mut first[group], &mut slabs[group]);
                 for k in 0..3 {
                     (boxes.min[k][lane], boxes.max[k][lane]) = (own.min[k], own.max[k]);
-                    slabs.normal[k][lane] = own.normal[k];
                 }
-                (slabs.between[0][lane], slabs.between[1][lane]) = (own.between[0], own.between[1]);
+                for (slabs, own) in slabs.iter_mut().zip(own.slabs) {
+                    for k in 0..3 {
+                        slabs.normal[k][lane] = own.normal[k];
+                    }
+                    (slabs.between[0][lane], slabs.between[1][lane]) = (own.between[0], own.between[1]);
+                }
             }
             fill_above(Level::new(), first, above);
         }
@@ -233,11 +248,17 @@ impl<S: Simd, V: RayVisitor> NearWalker<S> for Along<'_, V> {
     #[inline(always)]
     fn distances_sq(&self, simd: S, (level, group): (usize, usize), boxes: &Boxes) -> f32x16<S> {
         let mut stretches = boxes.stretches(simd, self.ray);
+        let mut passes: mask32x16<S> = stretches[0].simd_le(stretches[1]);
         if level == 0 {
-            stretches = self.tree.slabs[group].cut(simd, self.ray, stretches);
+            for slabs in &self.tree.slabs[group] {
+                if passes.all_false() {
+                    break;
+                }
+                stretches = slabs.cut(simd, self.ray, stretches);
+                passes = stretches[0].simd_le(stretches[1]);
+            }
         }
-        let [enter, exit] = stretches;
-        let passes: mask32x16<S> = enter.simd_le(exit);
+        let [enter, _] = stretches;
         passes.select(enter * enter, f32x16::splat(simd, f32::INFINITY))
     }
 
@@ -304,9 +325,11 @@ mod tests {
             let at = f64::from(from[k]);
             cut(f64::from(of.min[k]) - at, f64::from(of.max[k]) - at, way[k].into());
         }
-        let dot = |v: [f32; 3]| (0..3).map(|k| f64::from(of.normal[k]) * f64::from(v[k])).sum::<f64>();
-        let at = dot(from);
-        cut(f64::from(of.between[0]) - at, f64::from(of.between[1]) - at, dot(way));
+        for slab in of.slabs {
+            let dot = |v: [f32; 3]| (0..3).map(|k| f64::from(slab.normal[k]) * f64::from(v[k])).sum::<f64>();
+            let at = dot(from);
+            cut(f64::from(slab.between[0]) - at, f64::from(slab.between[1]) - at, dot(way));
+        }
         (enter <= exit).then_some(enter)
     }
 
@@ -326,15 +349,17 @@ mod tests {
                     let half = half.abs();
                     // Some are flat, some are all in one place.
                     let middle = if count == 256 { [0.25, 0.5, -0.5] } else { middle };
-                    let normal = if i % 3 == 0 { [0.0, 1.0, 0.0] } else { single(unit_vector(rng)) };
-                    let at: f32 = (0..3).map(|k| normal[k] * middle[k]).sum();
-                    let thick = if i % 5 == 0 { 0.0 } else { 0.3 * half };
-                    RayBox {
-                        min: middle.map(|c| c - half),
-                        max: middle.map(|c| c + half),
-                        normal,
-                        between: [at - thick, at + thick],
-                    }
+                    let slabs = [0, 1, 2].map(|k: usize| {
+                        let normal = if (i + k).is_multiple_of(3) {
+                            [0.0, 1.0, 0.0]
+                        } else {
+                            single(unit_vector(rng))
+                        };
+                        let at: f32 = (0..3).map(|k| normal[k] * middle[k]).sum();
+                        let thick = if (i + k).is_multiple_of(5) { 0.0 } else { [0.3, 0.6, 0.9][k] * half };
+                        Slab { normal, between: [at - thick, at + thick] }
+                    });
+                    RayBox { min: middle.map(|c| c - half), max: middle.map(|c| c + half), slabs }
                 })
                 .collect();
             let tree = BoxTree::new(boxes.len(), |i| boxes[i]);

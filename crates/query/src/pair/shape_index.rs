@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::{ClearanceGrid, NodeGrid, PointHierarchy, RayBoxes};
-use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
+use nearmiss_hierarchy::{ClearanceGrid, NodeGrid, PointHierarchy, ray_boxes};
+use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree, BoxTree};
 
 /// An index of the points and nodes of a scan, for testing thousands of shapes against its points
 /// ([`Placed::touches`](crate::Placed::touches)), or of shapes and rays against its surface
@@ -32,7 +32,7 @@ pub struct ShapeIndex {
     /// The nodes near each cell; `None` if some enclosure is unbounded.
     pub(crate) nodes: Option<Arc<NodeGrid>>,
     /// The boxes around the leaves, for rays; `None` if some enclosure is unbounded.
-    pub(crate) rays: Option<Arc<RayBoxes>>,
+    pub(crate) rays: Option<Arc<BoxTree>>,
     pub(crate) level: Level,
 }
 
@@ -46,7 +46,7 @@ impl ShapeIndex {
         let radius = f64::from(scan.arrays().sampling_radius);
         let nodes = NodeGrid::new(&scan.tree(), radius, scan.len(), level).map(Arc::new);
         let clear = ClearanceGrid::new(&scan.arrays(), level).map(Arc::new);
-        let rays = RayBoxes::new(&scan.arrays()).map(Arc::new);
+        let rays = ray_boxes(&scan.arrays()).map(Arc::new);
         Self { scan: scan.outline().identity, boxes, cells, clear, nodes, rays, level }
     }
 

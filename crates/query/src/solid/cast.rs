@@ -11,9 +11,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f32x4, mask32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{OrientedBox, PlaceVisitor, PointKind, Siblings};
+use nearmiss_hierarchy::{PlaceVisitor, PointKind, Siblings};
 use nearmiss_index::{BoxRay, RayVisitor};
-use nearmiss_lanes::prefetch;
 use nearmiss_lanes::wide::{Bits, product};
 use nearmiss_surface::Status;
 
@@ -110,7 +109,7 @@ pub(crate) fn crossings(
     search.limit(ray.max);
     // Ends early if any hit will do.
     let _ended = match elements.rays {
-        Some(rays) => rays.tree.visit_along(level, &BoxRay::new(from, along, thick), &mut search),
+        Some(rays) => rays.visit_along(level, &BoxRay::new(from, along, thick), &mut search),
         None => elements.arrays.tree.descend_to(level, from, &mut search),
     };
     let evidence = elements.of_separation(search.is_doubtful);
@@ -341,16 +340,12 @@ impl RayVisitor for Cast<'_, '_> {
 
     #[inline(always)]
     fn foresee(&self, number: usize) {
-        let elements = self.elements;
-        elements.arrays.prefetch_leaf(number);
-        if let Some(rays) = elements.rays {
-            prefetch(&rays.enclosures[number]);
-        }
+        self.elements.arrays.prefetch_leaf(number);
     }
 
     #[inline(always)]
     fn visit<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
-        self.look(simd, number, self.elements.rays.and_then(|rays| rays.enclosures.get(number)))
+        self.look(simd, number)
     }
 }
 
@@ -392,19 +387,14 @@ impl PlaceVisitor for Cast<'_, '_> {
 
     #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
-        self.look(simd, number, None)
+        self.look(simd, number)
     }
 }
 
 impl Cast<'_, '_> {
-    /// Compares the ray with the points of a leaf. An `enclosure` that it passes beside excludes them.
+    /// Compares the ray with the points of a leaf.
     #[inline(always)]
-    fn look<S: Simd>(
-        &mut self,
-        simd: S,
-        number: usize,
-        mut enclosure: Option<&OrientedBox>,
-    ) -> ControlFlow<()> {
+    fn look<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
         let elements = self.elements;
         if elements.certifies && elements.semantics == Semantics::Surface {
             self.is_doubtful = true;
@@ -416,10 +406,6 @@ impl Cast<'_, '_> {
             let found = self.lanes.crossings(simd, (block, count), &parts, (self.most, self.thick));
             if found.near == 0 {
                 continue;
-            }
-            // Few leaves have points near the ray that passes beside them.
-            if enclosure.take().is_some_and(|enclosure| !self.lanes.passes(enclosure, self.thick)) {
-                return ControlFlow::Continue(());
             }
             let met = if is_thin { found.met } else { 0 };
             // A ray that crosses a cell passes through what may contain the obstacle.

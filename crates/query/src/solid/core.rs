@@ -187,95 +187,6 @@ impl<'a> Solid<'a> {
         [self.centre - along, self.centre + along]
     }
 
-    /// The lowest place, against `out`, of a core that is a segment or a box within the cylinder over a
-    /// disc with that axis. `None` if the core is neither, or is beside the cylinder.
-    pub(crate) fn lowest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-        match self.core {
-            Core::Segment => self.lowest_of_segment(disc, out),
-            Core::Box => self.lowest_of_box(disc, out),
-            _ => None,
-        }
-    }
-
-    fn lowest_of_segment(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-        let across = |v: Vector| v - out * out.dot(&v);
-        let edge = self.axes[0] * self.half.x;
-        let (from, way) = (across(self.centre - disc.centre), across(edge));
-        let c = from.norm_squared() - disc.radius * disc.radius;
-        let [low, high] = least_range(way.norm_squared(), from.dot(&way), c)?;
-        Some(self.centre + edge * if out.dot(&edge) < 0.0 { high } else { low })
-    }
-
-    /// The lowest place of a box over a disc: where a face that looks down is lowest, or on an edge.
-    fn lowest_of_box(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-        /// Slopes below this are level.
-        const LEVEL: f64 = 1e-12;
-        let across = |v: Vector| v - out * out.dot(&v);
-        let rises = self.axes.map(|axis| axis.dot(out));
-        let away = across(self.centre - disc.centre);
-        // The face across axis k that looks down, at the place of the rim where it is lowest. The box is
-        // above the plane of the face, so no other place is lower.
-        for k in 0..3 {
-            if rises[k].abs() <= LEVEL {
-                continue;
-            }
-            let side = -1.0_f64.copysign(rises[k]);
-            let downhill = across(self.axes[k] * side);
-            let slope = downhill.norm();
-            let rim = if slope > LEVEL { downhill * (disc.radius / slope) } else { Vector::zeros() };
-            let beside = away + rim;
-            // From the centre of the box to the place on the face.
-            let height = (self.half[k] + side * self.axes[k].dot(&beside)) / -rises[k].abs();
-            let from = out * height - beside;
-            let is_on = |m: usize| self.axes[m].dot(&from).abs() <= self.half[m];
-            if is_on((k + 1) % 3) && is_on((k + 2) % 3) {
-                return Some(self.centre + from);
-            }
-        }
-        self.lowest_of_edges(disc, (&away, &rises), &self.axes.map(across))
-    }
-
-    /// The lowest place over a disc on an edge of a box. `away` is across the disc from its centre to that
-    /// of the box, `rises` are the slopes of the axes, and `across` their parts across the disc.
-    fn lowest_of_edges(
-        &self,
-        disc: &FlatDisc,
-        (away, rises): (&Vector, &[f64; 3]),
-        across: &[Vector; 3],
-    ) -> Option<Vector> {
-        // A height over the centre of the box, and the place in half edges from there.
-        let mut best: Option<(f64, Vector)> = None;
-        let edges = [0, 1, 2].map(|k| across[k] * self.half[k]);
-        let climbs = [0, 1, 2].map(|k| rises[k] * self.half[k]);
-        let along = edges.map(|edge| away.dot(&edge));
-        let product = edges.map(|edge| edges.map(|other| edge.dot(&other)));
-        let beyond = away.norm_squared() - disc.radius * disc.radius;
-        for k in 0..3 {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            // Not between two faces that look up.
-            let [low_i, low_j] = [rises[i], rises[j]].map(|rise| -1.0_f64.copysign(rise));
-            for [a, b] in [[low_i, low_j], [-low_i, low_j], [low_i, -low_j]] {
-                let middle = climbs[i] * a + climbs[j] * b;
-                if best.is_some_and(|(least, _)| middle - climbs[k].abs() >= least) {
-                    continue;
-                }
-                // The square of the distance from the axis, less that of the radius, along the edge.
-                let sides = a * along[i] + b * along[j] + a * b * product[i][j];
-                let c = beyond + product[i][i] + product[j][j] + 2.0 * sides;
-                let h = along[k] + a * product[i][k] + b * product[j][k];
-                let Some([low, high]) = least_range(product[k][k], h, c) else { continue };
-                let mut place = Vector::zeros();
-                (place[i], place[j], place[k]) = (a, b, if rises[k] < 0.0 { high } else { low });
-                let height = middle + climbs[k] * place[k];
-                if best.is_none_or(|(least, _)| height < least) {
-                    best = Some((height, place));
-                }
-            }
-        }
-        let (_, place) = best?;
-        Some((0..3).fold(self.centre, |x, k| x + self.axes[k] * (self.half[k] * place[k])))
-    }
-
     /// The point of the core furthest along `d`.
     pub(crate) fn support(&self, d: &Vector) -> Vector {
         match self.core {
@@ -440,17 +351,6 @@ impl<'a> Solid<'a> {
         let Closest { points, distance, lower } = closest(support, start, beyond);
         Closest { points: points.map(|p| p + centre), distance, lower }.into()
     }
-}
-
-/// The part of −1..1 in which a x² + 2 h x + c is not positive, for a ≥ 0.
-fn least_range(a: f64, h: f64, c: f64) -> Option<[f64; 2]> {
-    if a == 0.0 {
-        return (c <= 0.0).then_some([-1.0, 1.0]);
-    }
-    let square = h * h - a * c;
-    let root = if square >= 0.0 { square.sqrt() } else { return None };
-    let (low, high) = (((-h - root) / a).max(-1.0), ((-h + root) / a).min(1.0));
-    (low <= high).then_some([low, high])
 }
 
 /// An orthonormal frame whose first axis is `along`.

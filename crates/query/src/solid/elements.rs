@@ -5,8 +5,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{
-    ClearanceGrid, LeafBlock, NodeGrid, Part, PointKind, RayBoxes, SLAB, ScanArrays, Starts, THICKNESS,
+    ClearanceGrid, LeafBlock, NodeGrid, Part, PointKind, SLAB, ScanArrays, Starts, THICKNESS,
 };
+use nearmiss_index::BoxTree;
 use nearmiss_lanes::wide::{Bits, bits};
 
 use crate::ask::answer::Evidence;
@@ -43,7 +44,7 @@ pub(crate) struct Elements<'a> {
     /// The nodes near each place, if the scan has a shape index and the obstacle or points count.
     pub(crate) nodes: Option<&'a NodeGrid>,
     /// The boxes around the leaves, if the scan has a shape index and the obstacle or points count.
-    pub(crate) rays: Option<&'a RayBoxes>,
+    pub(crate) rays: Option<&'a BoxTree>,
     /// The detail of contacts.
     pub(crate) detail: Detail,
     pub(crate) semantics: Semantics,

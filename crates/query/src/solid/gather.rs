@@ -70,6 +70,7 @@ impl Gather<'_, '_> {
         if lanes == 0 {
             return;
         }
+        elements.arrays.prefetch_points(first);
         let (positions, normals) = (block.positions(simd), block.normals(simd));
         let [cx, cy, cz] = lane_box.centre;
         let d = [positions[0] - cx, positions[1] - cy, positions[2] - cz];
@@ -122,6 +123,11 @@ impl PlaceVisitor for Gather<'_, '_> {
     #[inline(always)]
     fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
         self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
+    }
+
+    #[inline(always)]
+    fn foresee(&self, number: usize) {
+        self.near.elements.arrays.prefetch_leaf(number);
     }
 
     #[inline(always)]

@@ -44,8 +44,8 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
         let is_exact = height <= 0.0 || (solid.radius == 0.0 && !is_edge);
         if is_exact {
             let point = lowest - out * height;
-            let is_met = height <= most
-                && (is_near(solid, &disc, &point, most) || disc_gap(solid, &disc, most).is_some());
+            let is_met =
+                height <= most && (is_near(solid, &point, most) || solid.reaches(&disc, most).is_some());
             return is_met.then_some(Place { point, normal: out, depth: solid.radius - height });
         }
     } else if solid.radius == 0.0 && solid.is_box() && !solid.is_point() && !is_edge {
@@ -75,15 +75,9 @@ fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<Gap> {
     Some(solid.gap(disc, most)).filter(|gap| gap.distance <= most)
 }
 
-/// Returns `true` if a core and a disc are soon found to be within `most`, from a point of the disc.
-fn is_near(solid: &Solid<'_>, disc: &FlatDisc, point: &Vector, most: f64) -> bool {
-    let most_sq = most * most;
-    let on_core = solid.nearest(point);
-    if (on_core - point).norm_squared() <= most_sq {
-        return true;
-    }
-    let on_core = solid.nearest(&disc.nearest(&on_core));
-    (on_core - disc.nearest(&on_core)).norm_squared() <= most_sq
+/// Returns `true` if a point is within `most` of a core.
+fn is_near(solid: &Solid<'_>, point: &Vector, most: f64) -> bool {
+    (solid.nearest(point) - point).norm_squared() <= most * most
 }
 
 /// The contact with a ball: along the way from its centre to the core or, if the core contains it, to

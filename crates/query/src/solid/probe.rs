@@ -18,6 +18,10 @@ const MOST_TO_TOUCH: usize = 5;
 /// The maximum number of parts that wait for others: each one that is halved leaves one more.
 const MOST_WAITING: usize = MOST_PARTS / 2 + 1;
 
+/// The estimated distance of what is nearest, relative to the one that is to be proven, from which on another
+/// place is looked up for the proof.
+const FAR_ENOUGH: f64 = 0.9;
+
 /// A direction from the nearest point, and its distance.
 type Direction = ([f64; 3], f64);
 
@@ -98,12 +102,13 @@ pub(crate) fn probe<'a>(
             continue;
         }
         // A ball of this radius about the place is in the core, if that is a point, a segment or a box.
-        let (named, direction) = probes.named(&at, part.half.min());
+        let (named, direction) = probes.named(&at, solid, (part.place, part.half.min()));
         if named.is_some_and(|i| each(i).is_break()) {
             return Probed::Ended;
         }
         let direction = direction.or_else(|| at.direction());
-        if is_clear {
+        // Another place tells more only if what is nearest is far enough.
+        if is_clear && direction.is_some_and(|(_, distance)| distance > FAR_ENOUGH * cover) {
             bound = bound.max(probes.beyond(part.place, direction));
             if bound > cover {
                 continue;
@@ -135,7 +140,7 @@ pub(crate) fn probe_ball<'a>(
 ) -> Probed<'a> {
     let Some(grid) = elements.clear else { return Probed::Open(None) };
     let probes = Probes { elements, grid, within: elements.margin + solid.radius, proven };
-    let (named, direction) = probes.named(&at, 0.0);
+    let (named, direction) = probes.named(&at, solid, (solid.centre, 0.0));
     if named.is_some_and(|i| each(i).is_break()) {
         return Probed::Ended;
     }
@@ -192,14 +197,25 @@ impl<'a> Probes<'_, 'a> {
         if self.proven { at.obstacle } else { at.discs }
     }
 
-    /// Returns the point that is named at a place, if a ball of radius `inner` about the place touches there.
-    /// Also the direction, if it was needed.
+    /// Returns the point that is named at a place, if a ball of radius `inner` about the place touches there,
+    /// or if what is nearest, by an estimate, is in the shape. Also the direction, if it was needed.
     #[inline(always)]
-    fn named(&self, at: &Clearance<'_>, inner: f64) -> (Option<usize>, Option<Direction>) {
+    fn named(
+        &self,
+        at: &Clearance<'_>,
+        solid: &Solid<'_>,
+        (place, inner): (Vector3<f64>, f64),
+    ) -> (Option<usize>, Option<Direction>) {
         let most = self.within + inner;
         let touches = at.farthest() <= most;
         let direction = if touches { None } else { at.direction() };
-        let may_touch = touches || at.discs <= most && direction.is_none_or(|(_, distance)| distance <= most);
+        let may_touch = match direction {
+            Some((way, distance)) if distance > most => {
+                let nearest = || place - Vector3::from(way) * distance;
+                !solid.is_point() && solid.is_box() && solid.distance(&nearest()) <= self.within
+            }
+            _ => touches || at.discs <= most,
+        };
         let point = |(leaf, number)| self.elements.arrays.leaves.points(leaf).start + number;
         (if may_touch { at.nearest().map(point) } else { None }, direction)
     }

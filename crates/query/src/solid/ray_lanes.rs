@@ -5,8 +5,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
-use nearmiss_hierarchy::{LeafBlock, OrientedBox};
-use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_hierarchy::LeafBlock;
 use nearmiss_lanes::wide::{along, bits, product, squared};
 
 use crate::solid::elements::Parts;
@@ -53,21 +52,6 @@ pub(crate) struct LaneCrossings {
 }
 
 impl LaneRay {
-    /// Returns `true` if the ray passes through a box that is grown by `radius`, which includes the
-    /// rounding errors.
-    #[inline(always)]
-    pub(crate) fn passes(&self, of: &OrientedBox, radius: f32) -> bool {
-        let (d, mut enter, mut exit) = (sub(of.centre, self.from), 0.0_f32, f32::MAX);
-        for (axis, half) in of.axes.iter().zip(of.half) {
-            let (at, speed) = (dot(*axis, d), dot(*axis, self.along));
-            let speed = if speed.abs() < LEAST_SPEED { LEAST_SPEED } else { speed };
-            let ends = [at - half - radius, at + half + radius].map(|end| end / speed);
-            enter = enter.max(ends[0].min(ends[1]));
-            exit = exit.min(ends[0].max(ends[1]));
-        }
-        enter <= exit
-    }
-
     /// Compares the ray with the points of a block. Nothing beyond `most` is of interest; a thick ray
     /// exceeds its centre by `radius`.
     #[inline(always)]

@@ -219,6 +219,11 @@ impl PlaceVisitor for Touch<'_, '_> {
     }
 
     #[inline(always)]
+    fn foresee(&self, number: usize) {
+        self.near.elements.arrays.prefetch_leaf(number);
+    }
+
+    #[inline(always)]
     fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
         let Self { near: Near { elements, solid, lane_box, most, .. }, found } = self;
         let (solid, most) = (*solid, *most);
