@@ -151,18 +151,6 @@ impl FlatDisc {
         if own.0 > 0.0 && slope(low).0 >= 0.0 {
             return middle + low;
         }
-        if c < radius_sq && own.0 != 0.0 {
-            // Over the disc the derivative is linear. Where its zero is beyond the rim, the search starts
-            // there.
-            let rim = ((b * b + a * (radius_sq - c)).sqrt() + b.copysign(b * own.0)) / a;
-            let zero = (own.0 / own.1).abs();
-            let is_beyond = zero > rim;
-            if !is_beyond {
-                return middle - zero.copysign(own.0);
-            }
-            s = (-rim.copysign(own.0) * (1.0 + 1e-9)).clamp(low, high);
-            own = slope(s);
-        }
         let near = PRECISION * per_radius;
         for round in 0..ROUNDS {
             if own.0 < 0.0 {

@@ -69,6 +69,8 @@ impl LaneBox {
         }
         let [cx, cy, cz] = self.centre;
         let d = [nodes.centre[0] - cx, nodes.centre[1] - cy, nodes.centre[2] - cz];
+        // A segment has a length along its first axis only.
+        let lengths = if self.is_segment { 1 } else { 3 };
         let mut sum = zero;
         let mut outer = [zero; 3];
         for k in 0..3 {
@@ -79,7 +81,7 @@ impl LaneBox {
             let mut reach = zero;
             if !self.is_point {
                 let widest = low.max(high);
-                for j in 0..3 {
+                for j in 0..lengths {
                     let [x, y, z] = self.axes[j];
                     let cosine = (ax * x + ay * y + az * z).abs();
                     reach += cosine * self.half[j];
@@ -94,7 +96,7 @@ impl LaneBox {
             return sum;
         }
         let mut other = zero;
-        for j in 0..3 {
+        for j in 0..lengths {
             let [x, y, z] = self.axes[j];
             let at = (d[0] * x + d[1] * y + d[2] * z).abs();
             let beyond = (at - outer[j] - self.half[j]).max(0.0);
