@@ -11,11 +11,12 @@ use std::process::Command;
 use nearmiss::{
     BuildOptions, Check, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Mesh,
     MeshBuildOptions, MeshPair, MeshQuality, MeshScanPair, MeshScanPlan, MeshScratch, Pair, PairHint,
-    PointCloud, Pose, Scan, Scratch,
+    PointCloud, Pose, Ray, Scan, Scratch, Shape, ShapePlan, Target,
 };
-use nearmiss_testdata::arbitrary::{rng, unit_vector};
+use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::scanner::{self, Frame};
 use object::{Object as _, ObjectSymbol as _};
+use rand::RngExt as _;
 
 use super::cases::{Case, in_room};
 use crate::object::Object;
@@ -50,6 +51,12 @@ pub enum Scenario {
     MeshesDistance,
     /// Hinted verdicts of small steps near contact.
     Hinted,
+    /// Estimated verdicts of spheres, capsules and boxes near a scan.
+    Touches,
+    /// Contacts of the same.
+    Contacts,
+    /// First hits of rays that pass near a scan.
+    Rays,
     /// Views of scans.
     View,
     /// Opening a prepared scan, its structure checked.
@@ -60,7 +67,7 @@ pub enum Scenario {
 
 impl Scenario {
     /// All scenarios with their names.
-    pub const ALL: [(Self, &'static str); 16] = [
+    pub const ALL: [(Self, &'static str); 19] = [
         (Self::Sweep, "sweep"),
         (Self::Near, "near"),
         (Self::Certified, "certified"),
@@ -74,6 +81,9 @@ impl Scenario {
         (Self::MeshesLikely, "meshes-likely"),
         (Self::MeshesDistance, "meshes-distance"),
         (Self::Hinted, "hinted"),
+        (Self::Touches, "touches"),
+        (Self::Contacts, "contacts"),
+        (Self::Rays, "rays"),
         (Self::View, "view"),
         (Self::Open, "open"),
         (Self::Build, "build"),
@@ -115,6 +125,22 @@ impl Scenario {
             }
             Self::MeshesDistance => meshes(|pair, scratch| pair.distance(scratch).upper > 0.0),
             Self::Hinted => hinted(&near()?, &quick),
+            Self::Touches => shapes(|target, (shapes, _), scratch| {
+                shapes.iter().filter(|shape| target.touch(shape, scratch).verdict.is_touching()).count()
+            }),
+            Self::Contacts => shapes(|target, (shapes, _), scratch| {
+                let mut found = Vec::new();
+                shapes
+                    .iter()
+                    .map(|shape| {
+                        target.contacts(shape, &mut found, scratch);
+                        found.len()
+                    })
+                    .sum()
+            }),
+            Self::Rays => shapes(|target, (_, rays), scratch| {
+                rays.iter().filter(|ray| target.cast(ray, scratch).hit.is_some()).count()
+            }),
             Self::View => {
                 let Case { scans, questions, .. } = sweep()?;
                 counted(&mut || {
@@ -306,6 +332,34 @@ fn meshes(ask: impl Fn(&MeshPair<'_>, &mut MeshScratch) -> bool) -> Result<(), F
             let [at_a, at_b] = &question.poses;
             std::hint::black_box(ask(&MeshPair::new(mesh.at(at_a), mesh.at(at_b)), &mut scratch));
         }
+    });
+    Ok(())
+}
+
+/// Asks about shapes, up to three sampling radii off points of a scan with a shape index, and about rays
+/// towards the same places.
+fn shapes(ask: impl Fn(&Target<'_>, (&[Shape<'_>], &[Ray]), &mut Scratch) -> usize) -> Result<(), Failure> {
+    const PLACES: usize = 200;
+    let scan = dragon()?.with_shapes();
+    let plan = ShapePlan::new(&CollideOptions::estimated().with_detail(Detail::Verdict), &scan)?;
+    let (target, mut scratch) = (Target::new(scan.at(&Pose::IDENTITY), &plan), Scratch::default());
+    let (rng, radius) = (&mut rng(1), f64::from(scan.arrays().sampling_radius));
+    let (mut shapes, mut rays) = (Vec::new(), Vec::new());
+    for _ in 0..PLACES {
+        let point = scan.arrays().position(rng.random_range(0..scan.len())).map(f64::from);
+        let (off, along) = (point_in(rng, 3.0 * radius), unit_vector(rng));
+        let centre = [0, 1, 2].map(|k| point[k] + off[k]);
+        let end = [0, 1, 2].map(|k| centre[k] + 4.0 * radius * along[k]);
+        let pose = rotation(rng).with_translation(centre);
+        shapes.push(Shape::Sphere { centre, radius });
+        shapes.push(Shape::Capsule { ends: [centre, end], radius });
+        shapes.push(Shape::Box { pose, half: [2.0, 1.0, 0.5].map(|half| half * radius), radius: 0.0 });
+        rays.push(Ray::new([0, 1, 2].map(|k| centre[k] - 3.0 * along[k]), along));
+    }
+    // The index computes what is near the surface when it is first asked.
+    let _found = ask(&target, (&shapes, &rays), &mut scratch);
+    counted(&mut || {
+        std::hint::black_box(ask(&target, (&shapes, &rays), &mut scratch));
     });
     Ok(())
 }
