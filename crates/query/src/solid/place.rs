@@ -45,7 +45,7 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
         if is_exact {
             let point = lowest - out * height;
             let is_met =
-                height <= most && (is_near(solid, &point, most) || solid.reaches(&disc, most).is_some());
+                height <= most && (solid.distance(&point) <= most || solid.reaches(&disc, most).is_some());
             return is_met.then_some(Place { point, normal: out, depth: solid.radius - height });
         }
     } else if solid.radius == 0.0 && solid.is_box() && !solid.is_point() && !is_edge {
@@ -73,11 +73,6 @@ fn near_gap(elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> Option<Gap>
 /// The nearest points of a core and a disc, if these are within `most`.
 fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<Gap> {
     Some(solid.gap(disc, most)).filter(|gap| gap.distance <= most)
-}
-
-/// Returns `true` if a point is within `most` of a core.
-fn is_near(solid: &Solid<'_>, point: &Vector, most: f64) -> bool {
-    (solid.nearest(point) - point).norm_squared() <= most * most
 }
 
 /// The contact with a ball: along the way from its centre to the core or, if the core contains it, to
