@@ -20,9 +20,9 @@ use crate::pair::placed_balls::is_proper;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{
-    contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
+    contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_part,
 };
-use crate::penetration::probe::{Deep, Probe, SLACK, deep_in_solids};
+use crate::penetration::probe::{Deep, Probe, SLACK, Where};
 use crate::penetration::scans::{PenetrationScratch, Piece};
 use crate::penetration::search::search;
 use crate::penetration::survey::{ContactSurvey, way_out};
@@ -173,35 +173,30 @@ impl<'s> MeshScanProbe<'s> {
             })
     }
 
-    /// Measures how deep a place is in both, of which some are solid. The place is moved to the nearest point
-    /// of one that is not: a measured one of the scan, any one of the mesh.
-    fn deep_in(
-        &mut self,
-        place: Vector,
-        t: Vector,
-        [is_scan_solid, is_mesh_solid]: [bool; 2],
-    ) -> Option<Deep> {
+    /// Measures how deep a place is in both. It is moved to the nearest point of the surface that it is to be
+    /// on: a measured one of the scan, any one of the mesh.
+    fn measured(&mut self, place: Vector, t: Vector, at: Where) -> Option<Deep> {
         let margin = self.plan.options().margin;
-        let mut found = Deep { place, depth: margin, in_a: 0.0, uphill: Vector::zeros() };
-        if !is_scan_solid {
-            let (point, radius) = world_nearest_point(&self.elements, &found.place)?;
+        let mut found = Deep { place, at, depth: margin, in_a: 0.0, uphill: Vector::zeros() };
+        if at == Where::OnA {
+            let (point, radius) = world_nearest_part(&self.elements, &found.place, self.contact.level)?;
             found.place = point;
             found.depth += radius;
             found.in_a = radius;
         }
         let (mesh, level) = (self.mesh.part, self.contact.level);
-        if !is_mesh_solid {
+        if at == Where::OnB {
             let own = mesh.pose().apply_inverse((found.place - t).into());
             found.place = t + Vector::from(mesh.pose().apply(foot(mesh.mesh(), self.view, level, own)));
         }
-        if is_scan_solid {
+        if at != Where::OnA {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
             let (depth, uphill) = world_depth_in(&self.whole_scan, &found.place, working)?;
             found.depth += depth;
             found.in_a = depth;
             found.uphill += uphill;
         }
-        if is_mesh_solid {
+        if at != Where::OnB {
             let (depth, uphill) = depth_in_solid(&self.solid_view(), &mesh, found.place - t)?;
             found.depth += depth;
             found.uphill += uphill;
@@ -238,14 +233,14 @@ impl Probe for MeshScanProbe<'_> {
         if is_cut_short { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
-        if self.are_solid == [false; 2] {
-            return ControlFlow::Continue(None);
-        }
+    fn places(&self) -> &'static [Where] {
+        Where::of(self.are_solid)
+    }
+
+    fn deep_at(&mut self, place: Vector, t: Vector, at: Where) -> ControlFlow<(), Option<Deep>> {
         self.budget.go_on(self.spent.work())?;
         self.spent.evaluations += 1;
-        let are_solid = self.are_solid;
-        ControlFlow::Continue(deep_in_solids(are_solid, |solid| self.deep_in(place, t, solid)))
+        ControlFlow::Continue(self.measured(place, t, at))
     }
 
     fn centres(&self) -> [Vector; 2] {

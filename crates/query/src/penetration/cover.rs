@@ -11,7 +11,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
-use crate::penetration::probe::{Deep, Probe, Vector};
+use crate::penetration::probe::{Deep, Probe, Vector, Where};
 
 /// Balls at most.
 const BALLS: usize = 192;
@@ -47,6 +47,7 @@ struct Ball {
     radius: f64,
     /// The place that proves it, after the shift by `t`.
     place: Vector,
+    at: Where,
     /// The share of a further shift by which the place moves if it is to stay in both things.
     share: f64,
 }
@@ -68,7 +69,7 @@ struct Cone {
 impl Ball {
     fn new(t: Vector, found: &Deep, rounding: f64) -> Self {
         let share = (found.in_a / found.depth).clamp(0.0, 1.0);
-        Self { t, radius: found.depth - rounding, place: found.place, share }
+        Self { t, radius: found.depth - rounding, place: found.place, at: found.at, share }
     }
 }
 
@@ -152,10 +153,18 @@ fn deep<P: Probe>(
     let mut best: Option<Deep> = None;
     let within = |ball: &&Ball| ball.radius - (t - ball.t).norm();
     let ball = balls.iter().max_by(|a, b| within(a).total_cmp(&within(b)));
-    let near = ball.into_iter().flat_map(|ball| [ball.share, 1.0].map(|s| ball.place + (t - ball.t) * s));
+    let near = ball
+        .into_iter()
+        .flat_map(|ball| [ball.share, 1.0].map(|share| (ball.place + (t - ball.t) * share, ball.at)));
     let last = last.map(|(shift, place)| place + (t - shift) * 0.5);
-    for place in near.chain(last).chain([probe.centres()[1] + t]) {
-        let found = probe.deep(place, t)?.filter(|found| found.depth > 0.0);
+    let others = last.into_iter().chain([probe.centres()[1] + t]);
+    let near = near.map(|(place, at)| (place, Some(at))).chain(others.map(|place| (place, None)));
+    for (place, at) in near {
+        let found = match at {
+            Some(at) => probe.deep_at(place, t, at)?,
+            None => probe.deep(place, t)?,
+        };
+        let found = found.filter(|found| found.depth > 0.0);
         best = [best, found].into_iter().flatten().max_by(|a, b| a.depth.total_cmp(&b.depth));
         if best.is_some_and(|best| best.depth >= wanted) {
             break;
@@ -168,7 +177,7 @@ fn deep<P: Probe>(
             break;
         }
         let Some(uphill) = best.uphill.try_normalize(1e-3) else { break };
-        match probe.deep(best.place + uphill * step, t)? {
+        match probe.deep_at(best.place + uphill * step, t, best.at)? {
             Some(found) if found.depth > best.depth => best = found,
             _ => step *= 0.5,
         }
@@ -292,7 +301,11 @@ mod tests {
             ControlFlow::Continue(())
         }
 
-        fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
+        fn places(&self) -> &'static [Where] {
+            Where::of([false, true])
+        }
+
+        fn deep_at(&mut self, place: Vector, t: Vector, at: Where) -> ControlFlow<(), Option<Deep>> {
             self.asked += 1;
             let place = Vector::new(place.x, place.y, 0.0);
             let from = place - self.centre - t;
@@ -300,7 +313,7 @@ mod tests {
             let left = |k: &usize| self.half[*k] - along[*k].abs();
             let nearest = (0..3).min_by(|i, k| left(i).total_cmp(&left(k))).unwrap();
             let (depth, uphill) = (left(&nearest), -self.axes[nearest] * along[nearest].signum());
-            ControlFlow::Continue((depth > 0.0).then_some(Deep { place, depth, in_a: 0.0, uphill }))
+            ControlFlow::Continue((depth > 0.0).then_some(Deep { place, at, depth, in_a: 0.0, uphill }))
         }
 
         fn centres(&self) -> [Vector; 2] {
@@ -367,7 +380,8 @@ mod tests {
                 cone = cone.divided()[rng.random_range(0..4)];
             }
             let t = Vector::from(unit_vector(rng)) * rng.random_range(0.0..1.0);
-            let ball = Ball { t, radius: rng.random_range(0.0..1.0), place: t, share: 0.0 };
+            let ball =
+                Ball { t, radius: rng.random_range(0.0..1.0), place: t, at: Where::Inside, share: 0.0 };
             let reach = cone.reach(&ball);
             if reach <= 0.5 {
                 continue;

@@ -32,7 +32,9 @@ pub(crate) fn climb<P: Probe>(
         let mut moved = false;
         for way in uphill.into_iter().chain(axes) {
             let deeper = |found: &Deep| found.depth > best.depth * (1.0 + 1e-6);
-            if let Some(found) = probe.deep(best.place + way * step, Vector::zeros())?.filter(deeper) {
+            if let Some(found) =
+                probe.deep_at(best.place + way * step, Vector::zeros(), best.at)?.filter(deeper)
+            {
                 (best, moved) = (found, true);
                 break;
             }

@@ -98,11 +98,8 @@ pub(crate) fn depth_in(
     if !is_surely_inside(elements, place, (level, found, scratch)) {
         return None;
     }
-    let found = distance(elements, Some(&Solid::point(*place)), f64::INFINITY, level)?;
-    let frame = elements.placed.stored_to_world();
-    let foot = Vector::from(frame.apply_inverse(found.points[0]));
-    let uphill = (place - foot).try_normalize(0.0).unwrap_or_else(Vector::zeros);
-    Some((found.lower / elements.scale(), uphill))
+    let (depth, foot) = foot(elements, place, level)?;
+    Some((depth, (place - foot).try_normalize(0.0).unwrap_or_else(Vector::zeros)))
 }
 
 /// The same with all places and lengths in the world.
@@ -143,21 +140,33 @@ pub(crate) fn some_points(placed: &Placed<'_>) -> [Vector; TESTED] {
     std::array::from_fn(|n| placed.point(placed.scan().len() * n / TESTED).into())
 }
 
-/// The same as [`nearest_point`] with all places and lengths in the world.
-pub(crate) fn world_nearest_point(elements: &Elements<'_>, place: &Vector) -> Option<(Vector, f64)> {
+/// The same as [`nearest_part`] with all places and lengths in the world.
+pub(crate) fn world_nearest_part(
+    elements: &Elements<'_>,
+    place: &Vector,
+    level: Level,
+) -> Option<(Vector, f64)> {
     let frame = elements.placed.stored_to_world();
-    let (point, radius) = nearest_point(elements, &frame.apply_inverse((*place).into()).into())?;
+    let (point, radius) = nearest_part(elements, &frame.apply_inverse((*place).into()).into(), level)?;
     Some((frame.apply(point.into()).into(), radius * frame.scale()))
 }
 
-/// The measured point nearest to a place, in the stored frame, and the radius about it that is part of the
-/// obstacle. `None` if points are no part of the obstacle.
-pub(crate) fn nearest_point(elements: &Elements<'_>, place: &Vector) -> Option<(Vector, f64)> {
+/// The place of the discs nearest to another one, in the stored frame, or the centre and the radius of the
+/// ball of the nearest measured point. `None` if these are no part of the obstacle.
+pub(crate) fn nearest_part(elements: &Elements<'_>, place: &Vector, level: Level) -> Option<(Vector, f64)> {
     if elements.semantics == Semantics::Surface {
         return None;
     }
     match elements.element(elements.placed.scan().nearest_point((*place).into()) as usize) {
-        Element::Disc(disc) => Some((disc.centre, 0.0)),
         Element::Ball(centre, radius) => Some((centre, radius)),
+        // Another disc may be nearer than that of the nearest point.
+        Element::Disc(_) => Some((foot(elements, place, level)?.1, 0.0)),
     }
+}
+
+/// The distance of a place of the stored frame from a scan, and the nearest place of the discs and balls.
+fn foot(elements: &Elements<'_>, place: &Vector, level: Level) -> Option<(f64, Vector)> {
+    let found = distance(elements, Some(&Solid::point(*place)), f64::INFINITY, level)?;
+    let foot = elements.placed.stored_to_world().apply_inverse(found.points[0]);
+    Some((found.lower / elements.scale(), foot.into()))
 }

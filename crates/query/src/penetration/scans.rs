@@ -11,9 +11,9 @@ use crate::pair::placed_balls::is_proper;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{
-    TESTED, contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_point,
+    TESTED, contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_part,
 };
-use crate::penetration::probe::{Deep, Probe, SLACK, Vector, deep_in_solids};
+use crate::penetration::probe::{Deep, Probe, SLACK, Vector, Where};
 use crate::penetration::search::{SearchScratch, search};
 use crate::penetration::survey::{ContactSurvey, way_out};
 use crate::solid::crossing::Crossing;
@@ -168,19 +168,20 @@ impl ScanProbe<'_> {
         self.budget.go_on(self.spent.work())
     }
 
-    /// Measures how deep a place is in both scans, of which some are solid. The place is moved to the nearest
-    /// measured point of one that is not.
-    fn deep_in(&mut self, place: Vector, t: Vector, solid: [bool; 2]) -> Option<Deep> {
-        let shifts = [Vector::zeros(), t];
+    /// Measures how deep a place is in both scans. It is moved to the nearest measured point of the surface
+    /// that it is to be on.
+    fn measured(&mut self, place: Vector, t: Vector, at: Where) -> Option<Deep> {
+        let (shifts, is_inside) = ([Vector::zeros(), t], at.is_inside());
         let margin = self.plan.options().margin;
-        let mut found = Deep { place, depth: margin, in_a: 0.0, uphill: Vector::zeros() };
-        for k in (0..2).filter(|&k| !solid[k]) {
-            let (point, radius) = world_nearest_point(&self.elements[k], &(found.place - shifts[k]))?;
+        let mut found = Deep { place, at, depth: margin, in_a: 0.0, uphill: Vector::zeros() };
+        for k in (0..2).filter(|&k| !is_inside[k]) {
+            let (point, radius) =
+                world_nearest_part(&self.elements[k], &(found.place - shifts[k]), self.contact.level)?;
             found.place = point + shifts[k];
             found.depth += radius;
             found.in_a += if k == 0 { radius } else { 0.0 };
         }
-        for k in (0..2).filter(|&k| solid[k]) {
+        for k in (0..2).filter(|&k| is_inside[k]) {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
             let (depth, uphill) = world_depth_in(&self.wholes[k], &(found.place - shifts[k]), working)?;
             found.depth += depth;
@@ -226,14 +227,14 @@ impl Probe for ScanProbe<'_> {
         if is_cut_short { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
-        if self.solid == [false; 2] {
-            return ControlFlow::Continue(None);
-        }
+    fn places(&self) -> &'static [Where] {
+        Where::of(self.solid)
+    }
+
+    fn deep_at(&mut self, place: Vector, t: Vector, at: Where) -> ControlFlow<(), Option<Deep>> {
         self.go_on()?;
         self.spent.evaluations += 1;
-        let are_solid = self.solid;
-        ControlFlow::Continue(deep_in_solids(are_solid, |solid| self.deep_in(place, t, solid)))
+        ControlFlow::Continue(self.measured(place, t, at))
     }
 
     fn centres(&self) -> [Vector; 2] {

@@ -78,6 +78,9 @@ const FINE: f64 = 1e-6;
 /// The number of directions that are tried first: of the contacts, of their normals, of the boxes.
 const DIRECTIONS: usize = 3 + 2 * KEPT + 7;
 
+/// The share of the upper bound that the lower one has to reach, however short it is.
+const SHARE: f64 = 0.6;
+
 /// Rounds of each refinement.
 const ROUNDS: usize = 8;
 
@@ -89,7 +92,7 @@ const TURNS: usize = 32;
 const WAYS_BACK: [f64; 5] = [0.5, 0.9, 0.1, 0.98, 0.02];
 
 /// The number of those places, and of others.
-const STARTS: usize = 3 * WAYS_BACK.len() + 1;
+const STARTS: usize = 3 * WAYS_BACK.len() + 1 + KEPT;
 
 /// The number of places from which deeper ones are looked for.
 const CLIMBS: usize = 2;
@@ -173,7 +176,7 @@ impl<P: Probe> Search<'_, P> {
         let mut ways = [Vector::zeros(); DIRECTIONS];
         // The contacts of a small overlap surround it; the axis of their ring crosses it.
         let axes = if self.contacts.count > 0 { self.contacts.axes() } else { [Vector::zeros(); 3] };
-        let found = axes.into_iter().chain(self.contacts.normals.iter().flatten().copied());
+        let found = axes.into_iter().chain(self.contacts.some.iter().flat_map(|(_, normals)| *normals));
         let ([a, b], boxes) = (self.probe.centres(), self.probe.axes());
         for (way, found) in ways.iter_mut().zip(found.chain([b - a]).chain(boxes.into_iter().flatten())) {
             *way = found;
@@ -263,7 +266,8 @@ impl<P: Probe> Search<'_, P> {
 
     /// A lower bound that need not be raised.
     fn enough(&self) -> f64 {
-        (self.best.length * (1.0 - 2.0 * FINE)).min(self.best.length - self.probe.slack())
+        let length = self.best.length;
+        (length * (1.0 - 2.0 * FINE)).min((length - self.probe.slack()).max(length * SHARE))
     }
 
     /// Raises the lower bound, from the deepest of some places.
@@ -298,7 +302,7 @@ impl<P: Probe> Search<'_, P> {
     }
 
     /// Places that may be inside both things: where they last touch on the way out, and part of the way back,
-    /// and the centre of the contacts.
+    /// and the centre of the contacts and some of them.
     fn starts(&mut self) -> ControlFlow<(), ([Vector; STARTS], usize)> {
         let (mut starts, mut count) = ([Vector::zeros(); STARTS], 0);
         let mut add = |start: Vector| {
@@ -317,6 +321,7 @@ impl<P: Probe> Search<'_, P> {
         }
         if self.contacts.count > 0 {
             add(self.contacts.centre());
+            self.contacts.some.iter().for_each(|(place, _)| add(*place));
         }
         ControlFlow::Continue((starts, count))
     }

@@ -9,8 +9,8 @@ use crate::ask::budget::Budget;
 use crate::pair::placed::ViewScratch;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::apart::out_of_balls;
-use crate::penetration::interior::{counts, depth_in, is_inside, nearest_point};
-use crate::penetration::probe::{Deep, Probe, SLACK, Vector};
+use crate::penetration::interior::{counts, depth_in, is_inside, nearest_part};
+use crate::penetration::probe::{Deep, Probe, SLACK, Vector, Where};
 use crate::penetration::search::{SearchScratch, search};
 use crate::penetration::survey::ContactSurvey;
 use crate::solid::answer::{ShapeAnswer, ShapeVerdict};
@@ -73,6 +73,28 @@ impl ShapeProbe<'_, '_> {
         out_of_balls([of_scan, own], elements.margin, |t| self.touch_at(t).verdict.is_separated())
     }
 
+    /// Measures how deep the place of the scan that is nearest to another one is in the shape.
+    fn deep_on_scan(&self, solid: &Solid<'_>, place: Vector) -> Option<Deep> {
+        let (place, radius) = nearest_part(self.elements, &place, self.level)?;
+        let (own, uphill) = solid.depth(&place).unwrap_or_else(|| {
+            let way = solid.nearest(&place) - place;
+            (solid.radius - way.norm(), way.try_normalize(0.0).unwrap_or_else(Vector::zeros))
+        });
+        let depth = self.elements.margin + radius + own;
+        (depth > 0.0).then_some(Deep { place, at: Where::OnA, depth, in_a: radius, uphill })
+    }
+
+    /// Measures how deep a place is in the scan and in the shape. A place outside the shape is moved to its
+    /// core.
+    fn deep_in_scan(&mut self, solid: &Solid<'_>, place: Vector) -> Option<Deep> {
+        let (place, (own, uphill)) = solid.deep_near(&place);
+        let elements = self.elements;
+        let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
+        let (in_a, away) = depth_in(elements, &place, working)?;
+        let depth = elements.margin + own + in_a;
+        Some(Deep { place, at: Where::Inside, depth, in_a, uphill: uphill + away })
+    }
+
     /// Breaks if the budget is spent. A test of the shape counts as an evaluation.
     fn go_on(&self) -> ControlFlow<()> {
         self.budget.go_on(self.spent.evaluations)
@@ -115,35 +137,18 @@ impl Probe for ShapeProbe<'_, '_> {
         ControlFlow::Continue(())
     }
 
-    /// The place is moved to the nearest measured point of a scan without inside, and to the core of a shape
-    /// that is beside it.
-    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
+    fn places(&self) -> &'static [Where] {
+        Where::of_shape(self.is_solid)
+    }
+
+    fn deep_at(&mut self, place: Vector, t: Vector, at: Where) -> ControlFlow<(), Option<Deep>> {
         self.go_on()?;
         self.spent.evaluations += 1;
-        let (elements, solid) = (self.elements, &self.solid.shifted(&t));
-        let found = if self.is_solid {
-            let (place, (own, uphill)) = match solid.depth(&place) {
-                Some(own) => (place, own),
-                None => (solid.nearest(&place), (solid.radius, Vector::zeros())),
-            };
-            let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
-            depth_in(elements, &place, working).map(|(depth, away)| Deep {
-                place,
-                depth: elements.margin + own + depth,
-                in_a: depth,
-                uphill: uphill + away,
-            })
-        } else {
-            nearest_point(elements, &place).and_then(|(point, radius)| {
-                let (own, uphill) = solid.depth(&point).unwrap_or_else(|| {
-                    let way = solid.nearest(&point) - point;
-                    (solid.radius - way.norm(), way.try_normalize(0.0).unwrap_or_else(Vector::zeros))
-                });
-                let depth = elements.margin + radius + own;
-                (depth > 0.0).then_some(Deep { place: point, depth, in_a: radius, uphill })
-            })
-        };
-        ControlFlow::Continue(found)
+        let solid = &self.solid.shifted(&t);
+        ControlFlow::Continue(match at {
+            Where::OnA => self.deep_on_scan(solid, place),
+            Where::Inside | Where::OnB => self.deep_in_scan(solid, place),
+        })
     }
 
     fn centres(&self) -> [Vector; 2] {

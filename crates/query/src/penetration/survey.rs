@@ -14,15 +14,16 @@ pub(crate) struct ContactSurvey {
     first: Vector,
     sum: Vector,
     products: [f64; 6],
-    /// Unit normals of both surfaces at some contacts, evenly spread over all.
-    pub(crate) normals: Vec<[Vector; 2]>,
+    /// The points of some contacts, the first one and others evenly spread over all, and the unit normals of
+    /// both surfaces there.
+    pub(crate) some: Vec<(Vector, [Vector; 2])>,
     /// One of this many contacts is kept.
     stride: u32,
     /// The greatest shift under which a contact surely stays.
     pub(crate) least: f64,
 }
 
-/// The number of contacts whose normals are kept at most.
+/// The number of contacts that are kept at most.
 pub(crate) const KEPT: usize = 8;
 
 /// The unit normals of both surfaces; 0 if they are not known.
@@ -39,9 +40,9 @@ pub(crate) fn way_out(contact: &Contact, t: Vector) -> Vector {
 impl ContactSurvey {
     /// Forgets all contacts, and keeps the memory.
     pub(crate) fn clear(&mut self) {
-        let mut normals = std::mem::take(&mut self.normals);
-        normals.clear();
-        *self = Self { normals, stride: 1, ..Self::default() };
+        let mut some = std::mem::take(&mut self.some);
+        some.clear();
+        *self = Self { some, stride: 1, ..Self::default() };
     }
 
     pub(crate) fn add(&mut self, point: Vector, normals: [Vector; 2], depth: f64) {
@@ -53,17 +54,17 @@ impl ContactSurvey {
         let products = [d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z];
         self.products = [0, 1, 2, 3, 4, 5].map(|k| self.products[k] + products[k]);
         if self.count.is_multiple_of(self.stride) {
-            if self.normals.len() == KEPT {
+            if self.some.len() == KEPT {
                 // Every other one.
                 let mut i = 0;
-                self.normals.retain(|_| {
+                self.some.retain(|_| {
                     i += 1;
                     i % 2 == 1
                 });
                 self.stride *= 2;
             }
             if self.count.is_multiple_of(self.stride) {
-                self.normals.push(normals);
+                self.some.push((point, normals));
             }
         }
         self.count += 1;

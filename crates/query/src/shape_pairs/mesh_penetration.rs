@@ -13,7 +13,7 @@ use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::{MeshSolid, SolidView};
 use crate::penetration::answer::Penetration;
 use crate::penetration::apart::out_of_balls;
-use crate::penetration::probe::{Deep, Probe, Vector};
+use crate::penetration::probe::{Deep, Probe, Vector, Where};
 use crate::penetration::search::{SearchScratch, search};
 use crate::penetration::survey::ContactSurvey;
 use crate::shape_pairs::mesh_distance::visit_near;
@@ -128,27 +128,21 @@ impl<'s> ShapeMeshProbe<'s> {
     /// Measures how deep a place is in the closed parts of the mesh and in the shape. A place beside the core
     /// is moved there.
     fn deep_in_both(&self, solid: &Solid<'_>, place: Vector) -> Option<Deep> {
-        if !self.parts.is_closed() {
-            return None;
-        }
-        let (place, (own, uphill)) = match solid.depth(&place) {
-            Some(own) => (place, own),
-            None => (solid.nearest(&place), (solid.radius, Vector::zeros())),
-        };
+        let (place, (own, uphill)) = solid.deep_near(&place);
         let placed = self.mesh.stored_to_world();
         let (depth, away) = depth_in_solid(&self.solid_view(), &self.mesh, self.in_world(place))?;
         let away = Vector::from(placed.rotate_inverse(away.into()));
         let in_a = depth / placed.scale();
-        Some(Deep { place, depth: own + in_a, in_a, uphill: uphill + away })
+        Some(Deep { place, at: Where::Inside, depth: own + in_a, in_a, uphill: uphill + away })
     }
 
     /// Measures how deep the place of the mesh that is nearest to another one is in the shape.
-    fn deep_at_surface(&self, solid: &Solid<'_>, place: Vector) -> Option<Deep> {
+    fn deep_on_mesh(&self, solid: &Solid<'_>, place: Vector) -> Option<Deep> {
         let on_mesh = foot(self.mesh.mesh(), self.view, self.level, self.in_input(place));
         let in_world = self.mesh.pose().apply(on_mesh);
         let place = Vector::from(self.mesh.stored_to_world().apply_inverse(in_world));
         let (depth, uphill) = solid.depth(&place)?;
-        Some(Deep { place, depth, in_a: 0.0, uphill })
+        Some(Deep { place, at: Where::OnA, depth, in_a: 0.0, uphill })
     }
 }
 
@@ -189,13 +183,18 @@ impl Probe for ShapeMeshProbe<'_> {
         })
     }
 
-    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
+    fn places(&self) -> &'static [Where] {
+        Where::of_shape(self.parts.is_closed())
+    }
+
+    fn deep_at(&mut self, place: Vector, t: Vector, at: Where) -> ControlFlow<(), Option<Deep>> {
         self.go_on()?;
         self.spent.evaluations += 1;
         let solid = &self.solid.shifted(&t);
-        let found = self.deep_in_both(solid, place);
-        // A solid may be too thin for a place inside to be hit.
-        ControlFlow::Continue(found.or_else(|| self.deep_at_surface(solid, place)))
+        ControlFlow::Continue(match at {
+            Where::OnA => self.deep_on_mesh(solid, place),
+            Where::Inside | Where::OnB => self.deep_in_both(solid, place),
+        })
     }
 
     fn centres(&self) -> [Vector; 2] {

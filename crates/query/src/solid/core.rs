@@ -275,6 +275,15 @@ impl<'a> Solid<'a> {
         (self.radius + depth > 0.0).then_some((self.radius + depth, uphill))
     }
 
+    /// A place inside the shape with its [`Self::depth`]: `x`, or if that is outside, the nearest one of the
+    /// core.
+    pub(crate) fn deep_near(&self, x: &Vector) -> (Vector, (f64, Vector)) {
+        match self.depth(x) {
+            Some(depth) => (*x, depth),
+            None => (self.nearest(x), (self.radius, Vector::zeros())),
+        }
+    }
+
     /// The distance of `x` from the core.
     pub(crate) fn distance(&self, x: &Vector) -> f64 {
         (x - self.nearest(x)).norm()

@@ -46,8 +46,8 @@ fn meshes_in_scans() {
     let scratch = &mut Scratch::default();
     for noise in [0.0, 0.1] {
         let [floor, ball] = [patch(4.0, 4.0), sphere(1.0)].map(|form| prepare(form, noise));
-        // Measured points may be above the floor.
-        let off = 4.0 * noise * 0.04 + 1e-6;
+        // Measured points may be above the floor, and the rims of discs are above the ball.
+        let off = 4.0 * noise * 0.04 + 0.5 * (0.65 * ball.sampling_radius()).powi(2) + 1e-6;
         let half = [0.5, 0.4, 0.3];
         let meshes = [half, [2.0; 3]].map(box_mesh);
         let [block, case] = meshes.each_ref().map(|mesh| (mesh, MeshSolid::new(mesh)));

@@ -16,7 +16,7 @@ use crate::mesh::penetration::triangle_depth::triangle_depth;
 use crate::mesh::placed::PlacedMesh;
 use crate::mesh::solid::SolidView;
 use crate::penetration::apart::out_of_balls;
-use crate::penetration::probe::{Deep, Probe, Vector, deep_in_solids};
+use crate::penetration::probe::{Deep, Probe, Vector, Where};
 use crate::penetration::survey::ContactSurvey;
 
 /// Two placed meshes, or parts of them, with their solids, and the cost of all tests so far. Shifts are
@@ -102,18 +102,18 @@ impl<'s> MeshProbe<'s> {
         })
     }
 
-    /// Measures how deep a place is in both things, of which these count as solids. The place is moved to the
-    /// nearest point of a surface.
-    fn deep_in(&self, place: Vector, t: Vector, solid: [bool; 2]) -> Option<Deep> {
-        let shifts = [Vector::zeros(), t];
-        let mut found = Deep { place, depth: 0.0, in_a: 0.0, uphill: Vector::zeros() };
-        for k in (0..2).filter(|&k| !solid[k]) {
+    /// Measures how deep a place is in both things. It is moved to the nearest point of the surface that it
+    /// is to be on.
+    fn measured(&self, place: Vector, t: Vector, at: Where) -> Option<Deep> {
+        let (shifts, is_inside) = ([Vector::zeros(), t], at.is_inside());
+        let mut found = Deep { place, at, depth: 0.0, in_a: 0.0, uphill: Vector::zeros() };
+        for k in (0..2).filter(|&k| !is_inside[k]) {
             let part = self.pieces[k].part;
             let own = part.pose().apply_inverse((found.place - shifts[k]).into());
             let on_mesh = part.pose().apply(foot(part.mesh(), &self.views[k], self.level, own));
             found.place = shifts[k] + Vector::from(on_mesh);
         }
-        for k in (0..2).filter(|&k| solid[k]) {
+        for k in (0..2).filter(|&k| is_inside[k]) {
             let placed = &self.pieces[k].part;
             let (depth, uphill) = depth_in_solid(self.solids[k].as_ref()?, placed, found.place - shifts[k])?;
             found.depth += depth;
@@ -164,16 +164,16 @@ impl Probe for MeshProbe<'_> {
         flow
     }
 
-    fn deep(&mut self, place: Vector, t: Vector) -> ControlFlow<(), Option<Deep>> {
-        let are_solid = self.solids.map(|solid| solid.is_some());
-        if are_solid == [false; 2] {
-            return ControlFlow::Continue(None);
-        }
+    fn places(&self) -> &'static [Where] {
+        Where::of(self.solids.map(|solid| solid.is_some()))
+    }
+
+    fn deep_at(&mut self, place: Vector, t: Vector, at: Where) -> ControlFlow<(), Option<Deep>> {
         let meshes = self.meshes();
         let Some(mut pair) = self.pair(&meshes) else { return ControlFlow::Break(()) };
         pair.meter.go_on()?;
         self.spent.evaluations += 1;
-        ControlFlow::Continue(deep_in_solids(are_solid, |solid| self.deep_in(place, t, solid)))
+        ControlFlow::Continue(self.measured(place, t, at))
     }
 
     fn centres(&self) -> [Vector; 2] {
