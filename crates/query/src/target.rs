@@ -227,8 +227,8 @@ impl<'a> Target<'a> {
     ///
     /// Both bounds are valid whenever `budget` ends the search; a test of the shape counts as one unit of
     /// work. The upper bound comes from a shift that was tested, and is a local minimum. The lower one comes
-    /// from the measured point that is deepest in the shape or, if the scan is solid, from a place that is
-    /// deep in both. With [`Semantics::Surface`](crate::Semantics) it is 0 for hollow scans.
+    /// from places of the scan that are deep in the shape or, if the scan is solid, from places that are deep
+    /// in both. With [`Semantics::Surface`](crate::Semantics) it is 0 for hollow scans.
     ///
     /// Costs some 200 to 500 times as much as [`touch`](Self::touch). Does not allocate once `scratch` is
     /// warm.

@@ -1030,7 +1030,7 @@ typedef struct NearmissSweepAnswer {
      */
     NearmissVerdict verdict;
     /*
-     The certainty of the verdict.
+     The certainty of the verdict; none for the impact of a shape.
      */
     NearmissEvidence evidence;
     /*
@@ -1062,7 +1062,8 @@ typedef struct NearmissSweepAnswer {
      */
     double nearest_at;
     /*
-     The length within which nothing is claimed about the scanned things themselves.
+     The length within which nothing is claimed about the scanned things themselves; for a shape the
+     sampling radius of the scan.
      */
     double band;
 } NearmissSweepAnswer;
@@ -1725,6 +1726,21 @@ NearmissStatus nearmiss_sweep(const struct NearmissPlan *plan,
                               const struct NearmissBudget *limits,
                               struct NearmissScratch *scratch,
                               struct NearmissSweepAnswer *out);
+
+/*
+ Proves that a shape stays clear of a scan, by more than the margin of the plan, along its motion, or
+ finds the first impact. The poses of the motion map the frame of the shape to the world. Thread safety:
+ one call at a time for each scratch.
+
+ # Safety
+ Pointers are null or valid, that to the points of a hull too.
+ */
+NearmissStatus nearmiss_shape_sweep(const struct NearmissPlan *plan,
+                                    const struct NearmissPlaced *scan,
+                                    const struct NearmissShape *shape,
+                                    const struct NearmissMotion *motion,
+                                    struct NearmissScratch *scratch,
+                                    struct NearmissSweepAnswer *out);
 
 /*
  Returns the default options: z points up, obstacles are steeper than 45 degrees. Thread safety: any

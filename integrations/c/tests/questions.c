@@ -168,6 +168,23 @@ static void motions(void) {
     OK(nearmiss_motion_new(down, 2, &moving));
     OK(nearmiss_sweep(plan, plate, still, plate, moving, NULL, scratch, &answer));
     CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED && answer.t_free == 1.0 && answer.clearance > 0.3);
+
+    NearmissPlaced floor = at(0, 0, 0);
+    const double place[3] = {0.5, 0.5, 0};
+    NearmissShape ball = nearmiss_sphere(&place, 0.1);
+    OK(nearmiss_shape_sweep(plan, &floor, &ball, moving, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED && answer.t_free == 1.0);
+    CHECK(answer.clearance > 0.35 && answer.clearance <= 0.4 && answer.upper <= 0.4 + 1e-9);
+    OK(nearmiss_motion_free(moving));
+    down[1] = at(0, 0, -1).pose;
+    OK(nearmiss_motion_new(down, 2, &moving));
+    OK(nearmiss_shape_sweep(plan, &floor, &ball, moving, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && answer.t_free <= answer.t_hit);
+    CHECK(fabs(answer.t_hit - 0.45) < 0.01 && answer.t_hit - answer.t_free < 0.02);
+    CHECK(fabs(answer.witness[2]) < 1e-3 && answer.evidence == NEARMISS_EVIDENCE_NONE);
+    ball.rounding = -1;
+    CHECK(nearmiss_shape_sweep(plan, &floor, &ball, moving, scratch, &answer) == NEARMISS_STATUS_ARGUMENT);
+    CHECK(nearmiss_shape_sweep(plan, &floor, NULL, moving, scratch, &answer) == NEARMISS_STATUS_NULL);
     OK(nearmiss_motion_free(moving));
     OK(nearmiss_motion_free(still));
 }

@@ -28,6 +28,7 @@ pub(crate) const fn sweep_reason_code(reason: SweepReason) -> i8 {
         SweepReason::Near => 7,
         SweepReason::Budget => 1,
         SweepReason::Pose => 5,
+        SweepReason::Shape => 6,
         SweepReason::Geodesic => 8,
         _ => 0,
     }

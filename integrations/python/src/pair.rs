@@ -103,7 +103,7 @@ impl<'a, S, M> Planned<'a, S, M> {
 }
 
 /// Reads options that are among `of_scans`, or `of_meshes` for two meshes.
-fn options_of(
+pub(crate) fn options_of(
     given: Option<&Bound<'_, PyDict>>,
     sides: &[Side<'_>; 2],
     [of_scans, of_meshes]: [&[&str]; 2],

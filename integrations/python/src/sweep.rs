@@ -1,6 +1,9 @@
-//! Sweeps: whole motions of two scans.
+//! Sweeps: whole motions of scans, meshes and shapes.
 
-use nearmiss::{Motion, PointHierarchy, Prepared as _, Sweep, SweepOptions, SweepPlan, SweepVerdict};
+use nearmiss::{
+    MeshScanSweep, MeshSweep, Motion, Pose, Prepared as _, ShapeSweepVerdict, Sweep, SweepOptions, SweepPlan,
+    SweepReason, SweepVerdict,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -9,48 +12,77 @@ use crate::codes::{
     sweep_reason_code, undecided, vector, verdict_name,
 };
 use crate::failure::refused;
-use crate::options::Options;
+use crate::options::OF_BUDGET;
+use crate::pair::options_of;
 use crate::pool::ask;
-use crate::poses::{Poses, check_each, pose_of};
-use crate::things::AnyScan;
+use crate::poses::{Placeable, Poses, check_each, pose_of};
+use crate::things::{Side, Thing};
 
-/// The names of options of a sweep.
+/// The names of options of a sweep with a scan.
 const OF_SWEEP: &[&str] = &["thickened", "surface_only", "work", "seconds"];
 
-/// Returns the motion of `scan` through poses.
-fn motion(given: Option<&Bound<'_, PyAny>>, scan: &PointHierarchy) -> PyResult<Motion> {
+/// Returns the motion of a scan or a mesh through poses.
+fn motion(given: Option<&Bound<'_, PyAny>>, thing: &dyn Placeable) -> PyResult<Motion> {
     let poses = Poses::new(given)?;
     let matrices = poses.matrices()?;
-    check_each(matrices, scan)?;
-    let poses: Result<Vec<_>, _> = matrices.iter().map(|matrix| pose_of(matrix, scan)).collect();
+    check_each(matrices, thing)?;
+    let poses: Result<Vec<_>, _> = matrices.iter().map(|matrix| pose_of(matrix, thing)).collect();
     Motion::through(&poses.map_err(refused)?).map_err(refused)
+}
+
+/// Returns the motion of a shape through poses.
+pub(crate) fn motion_of_shape(given: &Bound<'_, PyAny>) -> PyResult<Motion> {
+    let poses = Poses::new(Some(given))?;
+    let checked = poses.matrices()?.iter().enumerate().map(|(index, matrix)| {
+        Pose::from_matrix(matrix).map_err(|cause| refused(format!("pose {index}: {cause}")))
+    });
+    Motion::through(&checked.collect::<PyResult<Vec<_>>>()?).map_err(refused)
 }
 
 /// Prove that a whole motion is free, or find the first impact.
 ///
-/// `a` moves through the poses `path_a`, `b` through `path_b`, of shape (N, 4, 4), by screws; pose k is
-/// reached at time k. A single pose of shape (4, 4) stays. `clearance` is the distance that they keep, a
-/// length. Options: `thickened`, `surface_only`, `work`, `seconds`, as for `Scan.collide`. Returns a
-/// `SweepAnswer`, whose times count poses. Of a moving scan the current frame is swept.
+/// `a` and `b` are scans or meshes. `a` moves through the poses `path_a`, `b` through `path_b`, of shape
+/// (N, 4, 4), by screws; pose k is reached at time k. A single pose of shape (4, 4) stays. `clearance` is
+/// the distance that they keep, a length. Options: `thickened`, `surface_only`, `work`, `seconds`, as for
+/// `Scan.collide`; for two meshes `work` and `seconds`. Returns a `SweepAnswer`, whose times count poses. Of
+/// a moving scan the current frame is swept. `Target.sweep` moves a shape.
 #[pyfunction]
 #[pyo3(signature = (a, b, path_b, path_a = None, *, clearance = 0.0, **options))]
 pub(crate) fn sweep(
-    a: &Bound<'_, AnyScan>,
-    b: &Bound<'_, AnyScan>,
+    a: Thing<'_>,
+    b: Thing<'_>,
     path_b: &Bound<'_, PyAny>,
     path_a: Option<&Bound<'_, PyAny>>,
     clearance: f64,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<SweepAnswer> {
-    let py = a.py();
-    let (a, b) = (&a.get().0.frame(py), &b.get().0.frame(py));
-    let options = Options::new(options, OF_SWEEP, a.metric())?;
+    let sides = [a.side(), b.side()];
+    let options = options_of(options, &sides, [OF_SWEEP, OF_BUDGET])?;
     let asked = SweepOptions::default().with_semantics(options.collide.semantics).with_clearance(clearance);
-    let plan = SweepPlan::new(&asked, a, b).map_err(refused)?;
-    let (way_a, way_b) = (motion(path_a, a)?, motion(Some(path_b), b)?);
-    let answer = ask(py, |scratch| {
-        let sweep = Sweep::new(a.along(&way_a), b.along(&way_b)).within(&options.budget());
-        sweep.first_impact(&plan, scratch)
+    let plan = match &sides {
+        [Side::Scan(a), Side::Scan(b)] => SweepPlan::new(&asked, a, b),
+        [Side::Scan(scan), _] | [_, Side::Scan(scan)] => SweepPlan::against_mesh(&asked, scan),
+        [Side::Mesh(_), Side::Mesh(_)] => SweepPlan::of_meshes(&asked),
+    };
+    let plan = &plan.map_err(refused)?;
+    let (way_a, way_b) =
+        (&motion(path_a, sides[0].placeable())?, &motion(Some(path_b), sides[1].placeable())?);
+    let answer = ask(path_b.py(), |scratch| {
+        let budget = &options.budget();
+        match &sides {
+            [Side::Scan(a), Side::Scan(b)] => {
+                Sweep::new(a.along(way_a), b.along(way_b)).within(budget).first_impact(plan, scratch)
+            }
+            [Side::Scan(scan), Side::Mesh(mesh)] => MeshScanSweep::new(scan.along(way_a), &mesh.mesh, way_b)
+                .within(budget)
+                .first_impact(plan, scratch),
+            [Side::Mesh(mesh), Side::Scan(scan)] => MeshScanSweep::new(scan.along(way_b), &mesh.mesh, way_a)
+                .within(budget)
+                .first_impact(plan, scratch),
+            [Side::Mesh(a), Side::Mesh(b)] => {
+                MeshSweep::new([&a.mesh, &b.mesh], [way_a, way_b]).within(budget).first_impact(plan, scratch)
+            }
+        }
     });
     Ok(SweepAnswer(SweepRecord::new(&answer, way_a.duration().max(way_b.duration()))))
 }
@@ -74,7 +106,31 @@ pub(crate) struct SweepRecord {
 
 impl SweepRecord {
     pub(crate) fn new(answer: &nearmiss::SweepAnswer, duration: f64) -> Self {
-        let none = Self {
+        let none = Self::undecided(answer.band);
+        match answer.verdict {
+            SweepVerdict::Free { clearance, upper, at } => none.free([duration, clearance, upper, at]),
+            SweepVerdict::Impact { t_free, t_hit, contact, evidence } => {
+                Self { evidence: evidence_code(evidence), ..none.impact([t_free, t_hit], contact.point) }
+            }
+            SweepVerdict::Undecided { t_free, reason } => none.up_to(t_free, reason),
+        }
+    }
+
+    /// The record of a shape, with the sampling radius of the scan as its band.
+    pub(crate) fn of_shape(answer: &nearmiss::ShapeSweep, duration: f64, band: f64) -> Self {
+        let none = Self::undecided(band);
+        match answer.verdict {
+            ShapeSweepVerdict::Free { clearance, upper, at } => none.free([duration, clearance, upper, at]),
+            ShapeSweepVerdict::Impact { t_free, t_hit, contact } => {
+                none.impact([t_free, t_hit], contact.point)
+            }
+            ShapeSweepVerdict::Undecided { t_free, reason } => none.up_to(t_free, reason),
+        }
+    }
+
+    /// A record of which nothing but the band is known.
+    fn undecided(band: f64) -> Self {
+        Self {
             verdict: -1,
             evidence: -1,
             reason: 0,
@@ -84,29 +140,30 @@ impl SweepRecord {
             clearance: NONE,
             upper: NONE,
             at: NONE,
-            band: answer.band,
+            band,
             witness: NOWHERE,
-        };
-        match answer.verdict {
-            SweepVerdict::Free { clearance, upper, at } => {
-                Self { verdict: 0, evidence: 1, t_free: duration, clearance, upper, at, ..none }
-            }
-            SweepVerdict::Impact { t_free, t_hit, contact, evidence } => {
-                let (witness, evidence) = (contact.point, evidence_code(evidence));
-                Self { verdict: 1, evidence, t_free, t_hit, witness, ..none }
-            }
-            SweepVerdict::Undecided { t_free, reason } => {
-                Self { t_free, reason: sweep_reason_code(reason), ..none }
-            }
         }
+    }
+
+    fn free(self, [t_free, clearance, upper, at]: [f64; 4]) -> Self {
+        Self { verdict: 0, evidence: 1, t_free, clearance, upper, at, ..self }
+    }
+
+    fn impact(self, [t_free, t_hit]: [f64; 2], witness: [f64; 3]) -> Self {
+        Self { verdict: 1, t_free, t_hit, witness, ..self }
+    }
+
+    fn up_to(self, t_free: f64, reason: SweepReason) -> Self {
+        Self { t_free, reason: sweep_reason_code(reason), ..self }
     }
 }
 
 answer! {
-    /// The answer of `sweep`.
+    /// The answer of `sweep` and of `Target.sweep`.
     SweepAnswer of SweepRecord by sweep_in_words {
         @verdict hits: ["free", "impact"],
-        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided.
+        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided, and for
+        /// the impact of a shape.
         evidence: Option<&'static str> = evidence_name,
         /// The reason why the verdict is undecided, in a word; else None.
         reason: Option<&'static str> = reason_name,

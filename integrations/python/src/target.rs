@@ -13,6 +13,7 @@ use crate::shape::Shape;
 use crate::shape_answers::{
     RayAnswer, RayRecord, ShapeAnswer, ShapeContactRecord, ShapeDistance, ShapeDistanceRecord, ShapeRecord,
 };
+use crate::sweep::{SweepAnswer, SweepRecord, motion_of_shape};
 
 /// A placed scan, with the meaning of options. If the scan moves, each question is about its frame then.
 #[pyclass(frozen, module = "nearmiss")]
@@ -199,6 +200,19 @@ impl Target {
         let found =
             ask(py, |scratch| now.target().penetration(&convex, interior, &Budget::UNLIMITED, scratch));
         Ok((found.lower, found.upper, found.direction))
+    }
+
+    /// Prove that a shape stays clear of the scan during a whole motion, by more than the margin, or find the
+    /// first impact.
+    ///
+    /// The shape moves through the poses `path`, of shape (N, 4, 4), by screws; pose k is reached at time k.
+    /// Returns a `SweepAnswer`, whose times count poses.
+    fn sweep(&self, shape: &Bound<'_, Shape>, path: &Bound<'_, PyAny>) -> PyResult<SweepAnswer> {
+        let (py, convex, way) = (shape.py(), shape.get().convex(), motion_of_shape(path)?);
+        let now = self.now(py)?;
+        let band = now.target().scan().sampling_radius();
+        let answer = ask(py, |scratch| now.target().sweep(&convex, &way, scratch));
+        Ok(SweepAnswer(SweepRecord::of_shape(&answer, way.duration(), band)))
     }
 
     /// Find the first place where a ray, or a ball of `radius` along it, hits the scan.

@@ -5,6 +5,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::frame::{Frame, Source};
+use crate::poses::Placeable;
 
 /// A scan, still or moving: the base of `Scan` and `MovingScan`, with all questions about them.
 #[pyclass(frozen, subclass, module = "nearmiss")]
@@ -60,4 +61,14 @@ impl Thing<'_> {
 pub(crate) enum Side<'a> {
     Scan(Frame<'a>),
     Mesh(&'a Mesh),
+}
+
+impl Side<'_> {
+    /// Returns what poses place.
+    pub(crate) fn placeable(&self) -> &dyn Placeable {
+        match self {
+            Self::Scan(scan) => &**scan,
+            Self::Mesh(mesh) => &mesh.mesh,
+        }
+    }
 }

@@ -83,6 +83,36 @@ class Meshes(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "options among work"):
             mesh.penetration(mesh, margin=0.1)
 
+    def test_meshes_sweep(self):
+        mesh = nearmiss.Mesh(*cube())
+        path = np.stack([at(3.0), at(0.5)])
+        hit = nearmiss.sweep(mesh, mesh, path)
+        self.assertEqual((hit.verdict, hit.evidence), ("impact", "certified"))
+        self.assertTrue(0.79 < hit.t_free <= hit.t_hit < 0.802, hit)
+        kept = nearmiss.sweep(mesh, mesh, path, clearance=0.5)
+        self.assertAlmostEqual(kept.t_hit, 0.6, delta=2e-3)
+        # Both move: the second one towards the first one, which withdraws.
+        withdrawn = nearmiss.sweep(mesh, mesh, path, np.stack([at(0.0), at(-2.0)]))
+        self.assertEqual((withdrawn.verdict, withdrawn.t_free), ("free", 1.0))
+        self.assertAlmostEqual(withdrawn.upper, 1.5, delta=1e-6)
+        self.assertEqual(nearmiss.sweep(mesh, mesh, path, work=1).reason, "budget")
+        with self.assertRaisesRegex(TypeError, "options among work, seconds"):
+            nearmiss.sweep(mesh, mesh, path, thickened=1.0)
+        with self.assertRaisesRegex(TypeError, "expected a Scan, a MovingScan or a Mesh, got int"):
+            nearmiss.sweep(mesh, 1, path)
+
+    def test_a_mesh_sweeps_past_a_scan(self):
+        scan, small = dragon(), nearmiss.Mesh(*cube(0.02))
+        path = np.stack([at(0.4, 0.1), at(0.0, 0.1)])
+        hit, swapped = nearmiss.sweep(scan, small, path), nearmiss.sweep(small, scan, np.eye(4), path)
+        self.assertTrue(hit.hits and 0 < hit.t_free <= hit.t_hit < 1, hit)
+        self.assertEqual((hit.t_free, hit.t_hit, hit.witness), (swapped.t_free, swapped.t_hit, swapped.witness))
+        free = nearmiss.sweep(scan, small, np.stack([at(0.4, 0.1), at(0.4, -0.1)]))
+        self.assertEqual((free.verdict, free.evidence), ("free", "certified"))
+        for y in (0.1, 0.05, 0.0, -0.05, -0.1):
+            apart = scan.distance(small, at(0.4, y))
+            self.assertTrue(0.0 < free.clearance <= apart.upper and free.upper <= apart.upper * (1 + 1e-9), (y, apart))
+
     def test_files_and_pickles_hold_the_same_mesh(self):
         mesh = nearmiss.Mesh.read(DRAGON)
         with tempfile.TemporaryDirectory() as folder:

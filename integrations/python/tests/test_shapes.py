@@ -140,6 +140,31 @@ class Motions(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "margin"):
             nearmiss.sweep(scan, scan, over, clearance=-1)
 
+    def test_shapes_sweep(self):
+        x, y = np.meshgrid(np.arange(50) * 0.02, np.arange(50) * 0.02)
+        floor = nearmiss.Scan(np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3))
+        target, ball = floor.target(), Shape.sphere([0, 0, 0], 0.1)
+        down = nearmiss.pose(translation=[[0.5, 0.5, 1], [0.5, 0.5, -1]])
+        hit = target.sweep(ball, down)
+        self.assertEqual((hit.verdict, hit.hits, hit.evidence), ("impact", True, None))
+        self.assertAlmostEqual(hit.t_hit, 0.45, delta=0.005)
+        self.assertTrue(0.43 < hit.t_free <= hit.t_hit)
+        self.assertAlmostEqual(hit.witness[2], 0.0, 3)
+        self.assertEqual(hit.band, floor.sampling_radius)
+        beside = nearmiss.pose(translation=[[0.5, 0.5, 1], [0.5, 0.5, 0.4]])
+        free = target.sweep(ball, beside)
+        self.assertEqual((free.verdict, free.evidence, free.t_free), ("free", "certified", 1.0))
+        self.assertTrue(0.28 < free.clearance <= 0.3 <= free.upper + 1e-9)
+        self.assertTrue(floor.target(margin=0.35).sweep(ball, beside).hits)
+        # The path of a hull, and of a target that was moved.
+        wedge = Shape.hull([[0, 0, -0.1], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+        self.assertAlmostEqual(target.sweep(wedge, down).t_hit, 0.45, delta=0.005)
+        lifted = floor.target(nearmiss.pose(translation=[0, 0, 0.5]))
+        self.assertAlmostEqual(lifted.sweep(ball, down).t_hit, 0.2, delta=0.005)
+        with self.assertRaisesRegex(ValueError, "pose 1: "):
+            down[1, 0, 0] = 3
+            target.sweep(ball, down)
+
     def test_worlds_find_what_pairs_find(self):
         scan, at = dragon(), poses(7, 12, 0.2)
         world = nearmiss.World()

@@ -35,13 +35,6 @@ impl FlatDisc {
         self.centre + if length > self.radius { across * (self.radius / length) } else { across }
     }
 
-    /// Returns `true` if `x` is above or below the disc.
-    pub(crate) fn is_below(&self, x: &Vector3<f64>) -> bool {
-        let away = x - self.centre;
-        let height = self.normal.dot(&away);
-        away.norm_squared() - height * height <= self.radius * self.radius
-    }
-
     /// The point of the disc furthest along `d`, relative to its centre.
     #[inline]
     pub(crate) fn rim(&self, d: &Vector3<f64>) -> Vector3<f64> {

@@ -427,6 +427,7 @@ class Target:
     def distance_each(self, shapes: Sequence[Shape], within: SupportsFloat = ...) -> _Records: ...
     def contacts(self, shape: Shape, *, hint: ShapeHint | None = None) -> _Records: ...
     def penetration(self, shape: Shape, *, solid: bool = False) -> tuple[float, float, _Triple]: ...
+    def sweep(self, shape: Shape, path: _Poses) -> SweepAnswer: ...
     def cast(
         self, origin: ArrayLike, direction: ArrayLike, *, max: SupportsFloat = ..., radius: SupportsFloat = 0.0
     ) -> RayAnswer: ...
@@ -437,9 +438,20 @@ class Target:
         self, origin: ArrayLike, direction: ArrayLike, *, max: SupportsFloat = ..., radius: SupportsFloat = 0.0
     ) -> _Records: ...
 
+@overload
 def sweep(
-    a: AnyScan,
-    b: AnyScan,
+    a: Mesh,
+    b: Mesh,
+    path_b: _Poses,
+    path_a: _Poses = None,
+    *,
+    clearance: SupportsFloat = 0.0,
+    **options: Unpack[_BudgetOptions],
+) -> SweepAnswer: ...
+@overload
+def sweep(
+    a: AnyScan | Mesh,
+    b: AnyScan | Mesh,
     path_b: _Poses,
     path_a: _Poses = None,
     *,
