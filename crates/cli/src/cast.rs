@@ -25,7 +25,7 @@ use depth_picture::{Painted, Viewer};
 
 /// Options of `cast`.
 #[derive(Debug, Clone, Args)]
-#[command(group = clap::ArgGroup::new("asked").required(true).multiple(true).args(["rays", "image"]))]
+#[command(group = clap::ArgGroup::new("asked").required(true).multiple(true).args(["rays", "from", "image"]))]
 pub struct CastArgs {
     /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     pub scan: PathBuf,
@@ -44,31 +44,28 @@ pub struct CastArgs {
     /// Check prepared scans in full before use: checksums and all values
     #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
+    /// Cast one ray from this place towards --to; with --image, the place of the camera
+    ///
+    /// The ray goes on beyond --to.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true, requires = "to")]
+    pub from: Option<[f64; 3]>,
+    /// A place that the ray passes; with --image, the place that the camera looks at
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true, requires = "from")]
+    pub to: Option<[f64; 3]>,
+    /// Radius of a ball that moves along the ray from --from, or along those of the image; 0 for rays
+    #[arg(
+        long,
+        value_name = "R",
+        value_parser = parse_radius,
+        allow_hyphen_values = true,
+        requires = "from"
+    )]
+    pub radius: Option<f64>,
     /// Draw a depth image as PNG: one ray for each pixel, coloured by its length
     ///
     /// The camera is at --from and looks at --to.
     #[arg(long, value_name = "OUT.png", requires_all = ["from", "to"], help_heading = "Depth image")]
     pub image: Option<PathBuf>,
-    /// Place of the camera
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_parser = parse_place,
-        allow_hyphen_values = true,
-        requires = "image",
-        help_heading = "Depth image"
-    )]
-    pub from: Option<[f64; 3]>,
-    /// Place that the camera looks at
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_parser = parse_place,
-        allow_hyphen_values = true,
-        requires = "image",
-        help_heading = "Depth image"
-    )]
-    pub to: Option<[f64; 3]>,
     /// Width of the view in degrees, from 1 to 170
     #[arg(long, value_name = "DEGREES", default_value_t = 75.0, value_parser = parse_angle, help_heading = "Depth image")]
     pub angle: f64,
@@ -81,16 +78,6 @@ pub struct CastArgs {
         help_heading = "Depth image"
     )]
     pub up: Option<Up>,
-    /// Radius of balls that move along the rays of the image; 0 for rays
-    #[arg(
-        long,
-        value_name = "R",
-        value_parser = parse_radius,
-        allow_hyphen_values = true,
-        requires = "image",
-        help_heading = "Depth image"
-    )]
-    pub radius: Option<f64>,
     /// Print one JSON object for each ray
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -126,6 +113,13 @@ fn parse_angle(text: &str) -> Result<f64, String> {
     angle.ok_or_else(|| "expected an angle from 1 to 170 degrees".into())
 }
 
+impl CastArgs {
+    /// The places of `--from` and `--to`, if they are given.
+    fn ends(&self) -> Option<[[f64; 3]; 2]> {
+        self.from.zip(self.to).map(|(from, to)| [from, to])
+    }
+}
+
 pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let matrix = posing::from_option("--pose", args.pose.as_deref())?;
     let mut rays = args.rays.as_deref().map(RayFile::open).transpose()?;
@@ -142,10 +136,19 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let pose = posing::of_object(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
     let mut results = Results::new();
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
+    let unit = 0.01 * scan.sampling_radius() * pose.scale();
+    let asked = (&Target::new(scan.at(&pose), &plan), unit, args.json);
+    if let Some([eye, place]) = args.ends().filter(|_| args.image.is_none()) {
+        if eye == place {
+            return Err(same_places("the ray passes it"));
+        }
+        let way = [0, 1, 2].map(|k| place[k] - eye[k]);
+        let ray = Ray::new(eye, way).with_radius(args.radius.unwrap_or(0.0));
+        answer(asked, &ray, "", (&mut Scratch::default(), &mut results))?;
+    }
     if let Some(rays) = &mut rays {
-        let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
-        let unit = 0.01 * scan.sampling_radius() * pose.scale();
-        answer(args, (&Target::new(scan.at(&pose), &plan), unit), rays, &mut results)?;
+        answer_all(asked, rays, &mut results)?;
     }
     if let Some(path) = &args.image {
         let plan = ShapePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan)?;
@@ -154,36 +157,48 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// Answers all rays of a file. Places are rounded to `unit`.
-fn answer(
-    args: &CastArgs,
-    (target, unit): (&Target<'_>, f64),
-    rays: &mut RayFile,
-    results: &mut Results,
-) -> Result<(), CliError> {
+/// A target, the length to which places are rounded, and whether answers are JSON.
+type Asked<'a> = (&'a Target<'a>, f64, bool);
+
+/// Answers all rays of a file.
+fn answer_all(asked: Asked<'_>, rays: &mut RayFile, results: &mut Results) -> Result<(), CliError> {
     let mut scratch = Scratch::default();
     while let Some((line, text)) = rays.next_line()? {
         // Answers to the lines before a faulty one are written before the error.
         let ray = rays.ray(line, &text).or_else(|fault| results.flush().and(Err(fault)))?;
-        let start = now();
-        let answer = target.cast(&ray, &mut scratch);
-        #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-        let micros = start.elapsed().as_nanos() as f64 / 1e3;
-        let RayAnswer { hit, evidence } = answer;
-        if args.json {
-            results.json(&CastReport {
-                t: hit.map(|hit| hit.t),
-                point: hit.map(|hit| hit.point),
-                normal: hit.map(|hit| hit.normal),
-                source: hit.map(|hit| hit.source.0),
-                evidence: word(evidence),
-                micros,
-            })?;
-        } else {
-            results.line(format_args!("line {line}: {}", sentence(&answer, unit)))?;
-        }
+        answer(asked, &ray, &format!("line {line}: "), (&mut scratch, results))?;
     }
     Ok(())
+}
+
+/// Answers one ray; `name` precedes the sentence about it.
+fn answer(
+    (target, unit, is_json): Asked<'_>,
+    ray: &Ray,
+    name: &str,
+    (scratch, results): (&mut Scratch, &mut Results),
+) -> Result<(), CliError> {
+    let start = now();
+    let answer = target.cast(ray, scratch);
+    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    if !is_json {
+        return results.line(format_args!("{name}{}", sentence(&answer, unit)));
+    }
+    let RayAnswer { hit, evidence } = answer;
+    results.json(&CastReport {
+        t: hit.map(|hit| hit.t),
+        point: hit.map(|hit| hit.point),
+        normal: hit.map(|hit| hit.normal),
+        source: hit.map(|hit| hit.source.0),
+        evidence: word(evidence),
+        micros,
+    })
+}
+
+/// The error about equal places of `--from` and `--to`.
+fn same_places(why: &str) -> CliError {
+    CliError::Usage(format!("--to: expected another place than --from, got the same; {why}"))
 }
 
 /// Draws the depth image.
@@ -193,13 +208,10 @@ fn draw(
     (path, console): (&Path, Console),
     results: &mut Results,
 ) -> Result<(), CliError> {
-    let (Some(eye), Some(place)) = (args.from, args.to) else { return Ok(()) };
+    let Some(ends) = args.ends() else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
-    let viewer = Viewer::new(&view, target, [eye, place], args.angle).ok_or_else(|| {
-        CliError::Usage(
-            "--to: expected another place than --from, got the same; the camera looks at it".into(),
-        )
-    })?;
+    let viewer =
+        Viewer::new(&view, target, ends, args.angle).ok_or_else(|| same_places("the camera looks at it"))?;
     let bar = console.spinner(format_args!("painting {}", path.display()));
     let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let Painted { picture, share } = depth_picture::paint(target, &viewer, args.radius.unwrap_or(0.0), &name);

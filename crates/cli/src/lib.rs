@@ -183,8 +183,10 @@ Example; robot.jsonl has a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius
   nearmiss touch room.nm --shapes robot.jsonl --surface --margin 0.01";
 
 const CAST_EXAMPLE: &str = "\
-Example; rays.jsonl has a line {\"origin\":[0,0,1],\"direction\":[0,0,-1],\"max\":5} for each ray:
-  nearmiss cast room.nm --rays rays.jsonl --json";
+Examples; rays.jsonl has a line {\"origin\":[0,0,1],\"direction\":[0,0,-1],\"max\":5} for each ray:
+  nearmiss cast room.nm --from=0,0,1 --to=0,0,0
+  nearmiss cast room.nm --rays rays.jsonl --json
+  nearmiss cast room.nm --from=0,0,1 --to=2,1,1 --image depth.png";
 
 const SAMPLE_EXAMPLES: &str = "\
 Examples:

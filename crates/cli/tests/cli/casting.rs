@@ -49,6 +49,26 @@ fn rays_hit_a_ball_where_it_is() {
 }
 
 #[test]
+fn one_ray_needs_no_file() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    let asked = ["cast", "ball.xyz", "--from=-5,0,0", "--to=-3,0,0"];
+    let people = place.ok(&asked).results;
+    assert!(people.starts_with("It hits (") && people.contains(" after 4.00"), "{people}");
+    let t = |radius: &str| {
+        let told = place.ok(&[&asked[..], &["--radius", radius, "--json"]].concat()).json();
+        assert_eq!(told.len(), 1, "one ray");
+        told[0]["t"].as_f64().unwrap()
+    };
+    assert!((t("0") - 4.0).abs() < 0.01 && (t("0.5") - 3.5).abs() < 0.01, "{} and {}", t("0"), t("0.5"));
+    let away = place.ok(&["cast", "ball.xyz", "--from=2,0,0", "--to=3,0,0"]).results;
+    assert_eq!(away, "It hits nothing (certified).\n");
+    place.refused(2, &["cast", "ball.xyz", "--from=1,0,0"], &["--to"]);
+    place.refused(2, &["cast", "ball.xyz", "--to=1,0,0"], &["--from"]);
+    place.refused(2, &["cast", "ball.xyz", "--from=1,0,0", "--to=1,0,0"], &["--to", "another place"]);
+}
+
+#[test]
 fn what_is_no_ray_is_refused_with_its_line() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.2);
