@@ -173,8 +173,8 @@ impl<'s> MeshScanProbe<'s> {
             })
     }
 
-    /// Measures how deep a place is in both. It is moved to the nearest point of the surface that it is to be
-    /// on: a measured one of the scan, any one of the mesh.
+    /// Measures how deep a place is in both. It is moved to the nearest place of the surface that it is to be
+    /// on.
     fn measured(&mut self, place: Vector, t: Vector, at: Where) -> Option<Deep> {
         let margin = self.plan.options().margin;
         let mut found = Deep { place, at, depth: margin, in_a: 0.0, uphill: Vector::zeros() };

@@ -168,8 +168,8 @@ impl ScanProbe<'_> {
         self.budget.go_on(self.spent.work())
     }
 
-    /// Measures how deep a place is in both scans. It is moved to the nearest measured point of the surface
-    /// that it is to be on.
+    /// Measures how deep a place is in both scans. It is moved to the nearest place of the surface that it is
+    /// to be on.
     fn measured(&mut self, place: Vector, t: Vector, at: Where) -> Option<Deep> {
         let (shifts, is_inside) = ([Vector::zeros(), t], at.is_inside());
         let margin = self.plan.options().margin;
