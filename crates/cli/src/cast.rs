@@ -122,6 +122,9 @@ impl CastArgs {
 
 pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let matrix = posing::from_option("--pose", args.pose.as_deref())?;
+    if args.ends().is_some_and(|[from, to]| from == to) {
+        return Err(same_places());
+    }
     let mut rays = args.rays.as_deref().map(RayFile::open).transpose()?;
     if let Some(path) = &args.image {
         let inputs = [Some(&args.scan), args.rays.as_ref()];
@@ -139,12 +142,8 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
     let unit = 0.01 * scan.sampling_radius() * pose.scale();
     let asked = (&Target::new(scan.at(&pose), &plan), unit, args.json);
-    if let Some([eye, place]) = args.ends().filter(|_| args.image.is_none()) {
-        if eye == place {
-            return Err(same_places("the ray passes it"));
-        }
-        let way = [0, 1, 2].map(|k| place[k] - eye[k]);
-        let ray = Ray::new(eye, way).with_radius(args.radius.unwrap_or(0.0));
+    if let Some([from, to]) = args.ends().filter(|_| args.image.is_none()) {
+        let ray = Ray::new(from, [0, 1, 2].map(|k| to[k] - from[k])).with_radius(args.radius.unwrap_or(0.0));
         answer(asked, &ray, "", (&mut Scratch::default(), &mut results))?;
     }
     if let Some(rays) = &mut rays {
@@ -197,8 +196,8 @@ fn answer(
 }
 
 /// The error about equal places of `--from` and `--to`.
-fn same_places(why: &str) -> CliError {
-    CliError::Usage(format!("--to: expected another place than --from, got the same; {why}"))
+fn same_places() -> CliError {
+    CliError::Usage("--to: expected another place than --from, got the same".into())
 }
 
 /// Draws the depth image.
@@ -210,8 +209,7 @@ fn draw(
 ) -> Result<(), CliError> {
     let Some(ends) = args.ends() else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
-    let viewer =
-        Viewer::new(&view, target, ends, args.angle).ok_or_else(|| same_places("the camera looks at it"))?;
+    let viewer = Viewer::new(&view, target, ends, args.angle).ok_or_else(same_places)?;
     let bar = console.spinner(format_args!("painting {}", path.display()));
     let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let Painted { picture, share } = depth_picture::paint(target, &viewer, args.radius.unwrap_or(0.0), &name);
