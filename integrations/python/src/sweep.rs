@@ -1,8 +1,8 @@
 //! Sweeps: whole motions of scans, meshes and shapes.
 
 use nearmiss::{
-    MeshScanSweep, MeshSweep, Motion, Pose, Prepared as _, ShapeSweepVerdict, Sweep, SweepOptions, SweepPlan,
-    SweepReason, SweepVerdict,
+    MeshScanSweep, MeshSweep, Motion, Pose, PoseError, Prepared as _, ShapeSweepVerdict, Sweep, SweepOptions,
+    SweepPlan, SweepReason, SweepVerdict,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,28 +15,24 @@ use crate::failure::refused;
 use crate::options::OF_BUDGET;
 use crate::pair::options_of;
 use crate::pool::ask;
-use crate::poses::{Placeable, Poses, check_each, pose_of};
+use crate::poses::{Matrix, Poses, pose_of};
 use crate::things::{Side, Thing};
 
 /// The names of options of a sweep with a scan.
 const OF_SWEEP: &[&str] = &["thickened", "surface_only", "work", "seconds"];
 
-/// Returns the motion of a scan or a mesh through poses.
-fn motion(given: Option<&Bound<'_, PyAny>>, thing: &dyn Placeable) -> PyResult<Motion> {
+/// Returns the motion through poses, each of which `pose` makes of a matrix.
+pub(crate) fn motion(
+    given: Option<&Bound<'_, PyAny>>,
+    pose: impl Fn(&Matrix) -> Result<Pose, PoseError>,
+) -> PyResult<Motion> {
     let poses = Poses::new(given)?;
-    let matrices = poses.matrices()?;
-    check_each(matrices, thing)?;
-    let poses: Result<Vec<_>, _> = matrices.iter().map(|matrix| pose_of(matrix, thing)).collect();
-    Motion::through(&poses.map_err(refused)?).map_err(refused)
-}
-
-/// Returns the motion of a shape through poses.
-pub(crate) fn motion_of_shape(given: &Bound<'_, PyAny>) -> PyResult<Motion> {
-    let poses = Poses::new(Some(given))?;
-    let checked = poses.matrices()?.iter().enumerate().map(|(index, matrix)| {
-        Pose::from_matrix(matrix).map_err(|cause| refused(format!("pose {index}: {cause}")))
-    });
-    Motion::through(&checked.collect::<PyResult<Vec<_>>>()?).map_err(refused)
+    let made = poses
+        .matrices()?
+        .iter()
+        .enumerate()
+        .map(|(index, matrix)| pose(matrix).map_err(|cause| refused(format!("pose {index}: {cause}"))));
+    Motion::through(&made.collect::<PyResult<Vec<_>>>()?).map_err(refused)
 }
 
 /// Prove that a whole motion is free, or find the first impact.
@@ -65,8 +61,8 @@ pub(crate) fn sweep(
         [Side::Mesh(_), Side::Mesh(_)] => SweepPlan::of_meshes(&asked),
     };
     let plan = &plan.map_err(refused)?;
-    let (way_a, way_b) =
-        (&motion(path_a, sides[0].placeable())?, &motion(Some(path_b), sides[1].placeable())?);
+    let [of_a, of_b] = sides.each_ref().map(|side| |matrix: &Matrix| pose_of(matrix, side.placeable()));
+    let (way_a, way_b) = (&motion(path_a, of_a)?, &motion(Some(path_b), of_b)?);
     let answer = ask(path_b.py(), |scratch| {
         let budget = &options.budget();
         match &sides {

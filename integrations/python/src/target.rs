@@ -13,7 +13,7 @@ use crate::shape::Shape;
 use crate::shape_answers::{
     RayAnswer, RayRecord, ShapeAnswer, ShapeContactRecord, ShapeDistance, ShapeDistanceRecord, ShapeRecord,
 };
-use crate::sweep::{SweepAnswer, SweepRecord, motion_of_shape};
+use crate::sweep::{SweepAnswer, SweepRecord, motion};
 
 /// A placed scan, with the meaning of options. If the scan moves, each question is about its frame then.
 #[pyclass(frozen, module = "nearmiss")]
@@ -208,7 +208,7 @@ impl Target {
     /// The shape moves through the poses `path`, of shape (N, 4, 4), by screws; pose k is reached at time k.
     /// Returns a `SweepAnswer`, whose times count poses.
     fn sweep(&self, shape: &Bound<'_, Shape>, path: &Bound<'_, PyAny>) -> PyResult<SweepAnswer> {
-        let (py, convex, way) = (shape.py(), shape.get().convex(), motion_of_shape(path)?);
+        let (py, convex, way) = (shape.py(), shape.get().convex(), motion(Some(path), Pose::from_matrix)?);
         let now = self.now(py)?;
         let band = now.target().scan().sampling_radius();
         let answer = ask(py, |scratch| now.target().sweep(&convex, &way, scratch));
