@@ -9,6 +9,7 @@ pub(crate) mod closest;
 pub(crate) mod contacts;
 pub(crate) mod core;
 pub(crate) mod crossing;
+pub(crate) mod deepest;
 pub(crate) mod depths;
 pub(crate) mod descent;
 pub(crate) mod distance;

@@ -55,11 +55,13 @@ pub(crate) struct Candidate(u32);
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CandidateBlocks(Vec<CandidateBlock>);
 
-/// The candidate with the greatest number so far.
-struct Greatest {
-    number: f32,
-    i: u32,
-    candidate: Option<Candidate>,
+/// A number that ranks candidates. The greatest comes first; of equal ones that of the first point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Rank {
+    /// The bound of the depth of those whose place is not known, before the surface or behind it.
+    Depth { is_front: bool },
+    /// The distance from the nearest contact that was selected.
+    Distance,
 }
 
 impl CandidateBlock {
@@ -88,9 +90,23 @@ impl CandidateBlock {
         }
     }
 
-    /// The candidates before the surface, or those behind it.
-    fn on_side(&self, is_front: bool) -> u32 {
-        self.lanes & if is_front { !self.behind } else { self.behind }
+    /// The numbers that rank candidates.
+    #[inline(always)]
+    fn numbers(&self, rank: Rank) -> &[f32; WIDTH] {
+        match rank {
+            Rank::Depth { .. } => &self.most,
+            Rank::Distance => &self.away_sq,
+        }
+    }
+
+    /// The candidates that have a rank, as bits.
+    #[inline(always)]
+    fn ranked(&self, rank: Rank) -> u32 {
+        match rank {
+            Rank::Depth { is_front: true } => self.lanes & !self.placed & !self.behind,
+            Rank::Depth { is_front: false } => self.lanes & !self.placed & self.behind,
+            Rank::Distance => self.lanes,
+        }
     }
 }
 
@@ -159,24 +175,15 @@ impl CandidateBlocks {
         self.lanes(|block| block.missed)
     }
 
-    /// All candidates, each with a key that orders them by the distance from the nearest contact.
-    pub(crate) fn by_distance(&self) -> impl Iterator<Item = (u64, Candidate)> {
-        self.lanes(|block| block.lanes).map(|candidate| {
+    /// All candidates, each with a key that orders them, the first one last.
+    pub(crate) fn ordered(&self, rank: Rank) -> impl Iterator<Item = (u64, Candidate)> {
+        self.lanes(move |block| block.ranked(rank)).map(move |candidate| {
             let (block, lane) = self.at(candidate);
-            (self.key(candidate, block.away_sq[lane]), candidate)
+            // The bits of floats in their order.
+            let bits = block.numbers(rank)[lane].to_bits();
+            let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+            (u64::from(ordered) << 32 | u64::from(!id32(self.point(candidate))), candidate)
         })
-    }
-
-    /// The candidates that may be as deep as `depth` before the surface, or behind it, each with a key
-    /// that orders them by the bound.
-    pub(crate) fn deeper(&self, is_front: bool, depth: f32) -> impl Iterator<Item = (u64, Candidate)> {
-        let all = self.lanes(move |block| block.on_side(is_front));
-        all.map(|candidate| {
-            let (block, lane) = self.at(candidate);
-            (block.most[lane], candidate)
-        })
-        .filter(move |(most, _)| *most >= depth)
-        .map(|(most, candidate)| (self.key(candidate, most), candidate))
     }
 
     fn lanes(&self, of: impl Fn(&CandidateBlock) -> u32) -> impl Iterator<Item = Candidate> {
@@ -184,59 +191,58 @@ impl CandidateBlocks {
         all.flat_map(move |(n, block)| Bits(of(block)).map(move |lane| Candidate(id32(n * WIDTH + lane))))
     }
 
-    /// A key that orders candidates by a number, and equal ones by their points, the first one last.
-    fn key(&self, candidate: Candidate, number: f32) -> u64 {
-        // The bits of floats in their order.
-        let bits = number.to_bits();
-        let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
-        u64::from(ordered) << 32 | u64::from(!id32(self.point(candidate)))
-    }
-
-    /// The candidate that may be deepest, of those before the surface or of those behind it. O(n), as the
-    /// next ones.
-    pub(crate) fn deepest(&self, level: Level, is_front: bool) -> Option<Candidate> {
+    /// The candidate that comes first. O(n), as the next ones.
+    pub(crate) fn first(&self, level: Level, rank: Rank) -> Option<Candidate> {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.deepest_by(simd, is_front),
+            || self.first_by(simd, rank),
         ))
     }
 
     #[inline(always)]
-    fn deepest_by<S: Simd>(&self, simd: S, is_front: bool) -> Option<Candidate> {
-        let mut best = Greatest::NONE;
-        for (n, block) in self.0.iter().enumerate() {
-            let most = f32x16::load_array_ref(simd, &block.most);
-            best.offer(simd, most, block.on_side(is_front), (n, block.first));
+    fn first_by<S: Simd>(&self, simd: S, rank: Rank) -> Option<Candidate> {
+        let mut greatest = f32x16::splat(simd, f32::NEG_INFINITY);
+        for block in &self.0 {
+            let numbers = f32x16::load_array_ref(simd, block.numbers(rank));
+            greatest = greatest.max(among(simd, numbers, block.ranked(rank)));
         }
-        best.candidate
+        let greatest = greatest.reduce_max();
+        let (mut least, mut first) = (u32::MAX, None);
+        for (n, block) in self.0.iter().enumerate() {
+            let numbers = f32x16::load_array_ref(simd, block.numbers(rank));
+            let is_greatest: mask32x16<S> = numbers.simd_eq(greatest);
+            let Some(lane) = Bits(bits(is_greatest) & block.ranked(rank)).next() else { continue };
+            let i = block.first + id32(lane);
+            if i < least {
+                (least, first) = (i, Some(Candidate(id32(n * WIDTH + lane))));
+            }
+        }
+        first
     }
 
     /// Measures the distances from a contact of the point `own`, and removes the candidates that are not
-    /// apart from it. Returns the one that is furthest from all contacts.
-    pub(crate) fn separate(&mut self, level: Level, at: [f32; 3], own: usize) -> Option<Candidate> {
+    /// apart from it. O(n).
+    pub(crate) fn separate(&mut self, level: Level, at: [f32; 3], own: usize) {
         let own = id32(own);
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || self.separate_by(simd, at, own),
-        ))
+        ));
     }
 
     #[inline(always)]
-    fn separate_by<S: Simd>(&mut self, simd: S, at: [f32; 3], own: u32) -> Option<Candidate> {
-        let mut best = Greatest::NONE;
-        for (n, block) in self.0.iter_mut().enumerate() {
+    fn separate_by<S: Simd>(&mut self, simd: S, at: [f32; 3], own: u32) {
+        for block in &mut self.0 {
             let away_sq = squared(seen_from(simd, &block.centres, at));
             let away_sq = away_sq.min(f32x16::load_array_ref(simd, &block.away_sq));
             block.away_sq = away_sq.to_array();
             let is_apart: mask32x16<S> = away_sq.simd_ge(f32x16::load_array_ref(simd, &block.apart_sq));
             let is_own = 1_u32.checked_shl(own.wrapping_sub(block.first)).unwrap_or(0);
             block.lanes &= bits(is_apart) & !is_own;
-            best.offer(simd, away_sq, block.lanes, (n, block.first));
         }
-        best.candidate
     }
 
-    /// The candidate whose centre is nearest to `at`, except some points.
+    /// The candidate whose centre is nearest to `at`, except some points. O(n).
     pub(crate) fn nearest(&self, level: Level, at: [f32; 3], except: &[u32]) -> Option<(f32, Candidate)> {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -246,14 +252,20 @@ impl CandidateBlocks {
 
     #[inline(always)]
     fn nearest_by<S: Simd>(&self, simd: S, at: [f32; 3], except: &[u32]) -> Option<(f32, Candidate)> {
-        let mut best = Greatest::NONE;
+        let (mut best, mut nearest) = ((f32::INFINITY, u32::MAX), None);
         for (n, block) in self.0.iter().enumerate() {
-            let away_sq = squared(seen_from(simd, &block.centres, at));
             let excepted = |&i: &u32| 1_u32.checked_shl(i.wrapping_sub(block.first)).unwrap_or(0);
             let lanes = block.lanes & !except.iter().map(excepted).fold(0, |all, own| all | own);
-            best.offer(simd, -away_sq, lanes, (n, block.first));
+            let away_sq = squared(seen_from(simd, &block.centres, at));
+            let least = -among(simd, -away_sq, lanes).reduce_max();
+            let is_least: mask32x16<S> = away_sq.simd_eq(least);
+            let Some(lane) = Bits(bits(is_least) & lanes).next() else { continue };
+            let own = (least, block.first + id32(lane));
+            if own < best {
+                (best, nearest) = (own, Some(Candidate(id32(n * WIDTH + lane))));
+            }
         }
-        Some((-best.number, best.candidate?))
+        Some((best.0, nearest?))
     }
 
     /// The candidate of a point, if it is one.
@@ -267,23 +279,77 @@ impl CandidateBlocks {
     }
 }
 
-impl Greatest {
-    const NONE: Self = Self { number: f32::NEG_INFINITY, i: u32::MAX, candidate: None };
+/// The numbers in `lanes`, and negative infinity in the others.
+#[inline(always)]
+fn among<S: Simd>(simd: S, numbers: f32x16<S>, lanes: u32) -> f32x16<S> {
+    let is_there = mask32x16::from_bitmask(simd, u64::from(lanes));
+    is_there.select(numbers, f32x16::splat(simd, f32::NEG_INFINITY))
+}
 
-    /// Compares the candidates in `lanes` of block `n`, whose first point is given.
-    #[inline(always)]
-    fn offer<S: Simd>(&mut self, simd: S, numbers: f32x16<S>, lanes: u32, (n, first): (usize, u32)) {
-        let is_there = mask32x16::from_bitmask(simd, u64::from(lanes));
-        let numbers = is_there.select(numbers, f32x16::splat(simd, f32::NEG_INFINITY));
-        let greatest = numbers.reduce_max();
-        if greatest < self.number {
-            return;
-        }
-        let is_greatest: mask32x16<S> = numbers.simd_eq(greatest);
-        let Some(lane) = Bits(bits(is_greatest) & lanes).next() else { return };
-        let i = first + id32(lane);
-        if greatest > self.number || i < self.i {
-            *self = Self { number: greatest, i, candidate: Some(Candidate(id32(n * WIDTH + lane))) };
+#[cfg(test)]
+mod tests {
+    use std::collections::BinaryHeap;
+
+    use nearmiss_testdata::arbitrary::rng;
+    use nearmiss_testdata::instructions::levels;
+    use rand::RngExt;
+
+    use super::*;
+
+    /// Candidates come in the order of their numbers, and equal ones in that of their points, whether they
+    /// are looked for one by one or ordered at once, in any order of the blocks.
+    #[test]
+    fn candidates_come_in_one_order() {
+        let rng = &mut rng(7359);
+        for round in 0..200 {
+            let mut firsts: Vec<usize> = (0..rng.random_range(1..9)).map(|n| n * WIDTH).collect();
+            let by = rng.random_range(0..firsts.len());
+            firsts.rotate_left(by);
+            let mut found = CandidateBlocks::default();
+            for &first in &firsts {
+                let lanes = CandidateLanes {
+                    found: rng.random_range(0..1 << WIDTH),
+                    missed: 0,
+                    turned: 0,
+                    behind: rng.random_range(0..1 << WIDTH),
+                };
+                // Many are equal.
+                let numbers = [(); WIDTH].map(|()| [0.5, -1.0, 2.0, f32::INFINITY][rng.random_range(0..4)]);
+                let block = dispatch!(Level::new(), simd => {
+                    let depths = f32x16::load_array(simd, numbers);
+                    CandidateBlock::new(first, lanes, [[0.0; WIDTH]; 3], [depths, depths])
+                });
+                found.push(CandidateBlock { away_sq: numbers.map(f32::abs), ..block });
+            }
+            for rank in [Rank::Depth { is_front: true }, Rank::Depth { is_front: false }, Rank::Distance] {
+                let all = found.lanes(|block| block.ranked(rank));
+                let mut expected: Vec<(f32, usize)> = all
+                    .map(|candidate| {
+                        let (block, lane) = found.at(candidate);
+                        (block.numbers(rank)[lane], found.point(candidate))
+                    })
+                    .collect();
+                expected.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                let expected: Vec<usize> = expected.into_iter().map(|(_, i)| i).collect();
+                let heap: BinaryHeap<(u64, Candidate)> = found.ordered(rank).collect();
+                let ordered: Vec<usize> = heap
+                    .into_sorted_vec()
+                    .iter()
+                    .rev()
+                    .map(|&(_, candidate)| found.point(candidate))
+                    .collect();
+                assert_eq!(ordered, expected, "round {round}, {rank:?}");
+                for level in levels() {
+                    let mut left = found.clone();
+                    let one_by_one: Vec<usize> = std::iter::from_fn(|| {
+                        let candidate = left.first(level, rank)?;
+                        left.remove(candidate);
+                        Some(left.point(candidate))
+                    })
+                    .collect();
+                    assert_eq!(one_by_one, expected, "round {round}, {rank:?}, {level:?}");
+                }
+            }
         }
     }
 }

@@ -17,7 +17,7 @@ use nearmiss_lanes::id32;
 use crate::ask::options::Detail;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
-use crate::solid::candidates::{Candidate, CandidateBlocks};
+use crate::solid::candidates::{Candidate, CandidateBlocks, Rank};
 use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
@@ -32,6 +32,9 @@ type Vector = Vector3<f64>;
 
 /// Another contact may be this much deeper than the first, in local radii.
 const LEVEL: f64 = 0.01;
+
+/// Candidates that are looked for one by one, before all others are ordered.
+const SCANS: u32 = 8;
 
 /// Candidates that are compared with a contact of the last frame.
 const TRIES: usize = 3;
@@ -63,14 +66,12 @@ struct Selection<'s, 'a> {
     level: Level,
     found: &'s mut CandidateBlocks,
     places: &'s mut Vec<Met>,
-    /// Candidates that are still to be looked at, by the number that matters.
+    /// The candidates in order, once so many have been tried.
     order: &'s mut BinaryHeap<(u64, Candidate)>,
+    /// The number of candidates that have been tried by the same rank.
+    tries: u32,
     taken: [Option<Met>; MOST],
     count: usize,
-    /// The furthest candidate from all contacts, until it is looked at.
-    next: Option<Candidate>,
-    /// `true` if `order` has the others.
-    is_ordered: bool,
 }
 
 /// Writes the manifold of `solid` and the scan to `out`.
@@ -105,10 +106,9 @@ pub(crate) fn contacts(
             found,
             places,
             order,
+            tries: 0,
             taken: [None; MOST],
             count: 0,
-            next: None,
-            is_ordered: false,
         };
         selection.run(hint.as_deref());
         for (n, met) in selection.taken.iter().flatten().enumerate() {
@@ -190,20 +190,12 @@ impl Selection<'_, '_> {
     /// Returns the number of the deepest place, up to [`LEVEL`], of those before or behind the surface.
     /// Computes places as long as another one may be deeper.
     fn deepest(&mut self, is_front: bool) -> Option<usize> {
-        let first = self.found.deepest(self.level, is_front)?;
-        let mut best = self.place(first);
-        let enough = |places: &[Met], best: usize| {
-            let Met { contact, band, .. } = &places[best];
-            (contact.depth + LEVEL * band) / self.elements.scale()
-        };
-        // No less is enough later, whatever the local radius of a deeper place.
-        let depth = |best: usize| self.places[best].contact.depth / self.elements.scale();
-        #[expect(clippy::cast_possible_truncation, reason = "compared once more below")]
-        let least = best.map_or(f32::NEG_INFINITY, |best| (depth(best) as f32).next_down());
-        self.order.clear();
-        self.order.extend(self.found.deeper(is_front, least));
-        while let Some((_, candidate)) = self.order.pop() {
-            if best.is_some_and(|best| enough(self.places, best) >= self.found.most(candidate)) {
+        let mut best: Option<usize> = None;
+        self.tries = 0;
+        while let Some(candidate) = self.next(Rank::Depth { is_front }) {
+            let enough =
+                |Met { contact, band, .. }: &Met| (contact.depth + LEVEL * band) / self.elements.scale();
+            if best.is_some_and(|best| enough(&self.places[best]) >= self.found.most(candidate)) {
                 break;
             }
             if let Some(own) = self.place(candidate)
@@ -213,6 +205,19 @@ impl Selection<'_, '_> {
             }
         }
         best
+    }
+
+    /// Returns the candidate that comes next, of all whose place is not known or that are removed otherwise.
+    fn next(&mut self, rank: Rank) -> Option<Candidate> {
+        self.tries += 1;
+        if self.tries <= SCANS {
+            return self.found.first(self.level, rank);
+        }
+        if self.tries == SCANS + 1 {
+            self.order.clear();
+            self.order.extend(self.found.ordered(rank));
+        }
+        self.order.pop().map(|(_, candidate)| candidate)
     }
 
     /// Takes the place of a candidate that continues a contact of the last frame: of the same point or,
@@ -248,18 +253,9 @@ impl Selection<'_, '_> {
 
     /// Returns the number of the place of the furthest disc or ball from all contacts.
     fn furthest(&mut self) -> Option<usize> {
+        self.tries = 0;
         loop {
-            let candidate = match self.next.take() {
-                Some(candidate) => candidate,
-                None => {
-                    if !self.is_ordered {
-                        self.order.clear();
-                        self.order.extend(self.found.by_distance());
-                        self.is_ordered = true;
-                    }
-                    self.order.pop()?.1
-                }
-            };
+            let candidate = self.next(Rank::Distance)?;
             if let Some(own) = self.place(candidate) {
                 if self.is_free(own) {
                     return Some(own);
@@ -281,8 +277,7 @@ impl Selection<'_, '_> {
         let met = self.places[own];
         self.taken[self.count] = Some(met);
         self.count += 1;
-        self.next = self.found.separate(self.level, single(met.at), met.i);
-        self.is_ordered = false;
+        self.found.separate(self.level, single(met.at), met.i);
     }
 }
 

@@ -1,4 +1,4 @@
-//! The lowest place of a shape over a disc.
+//! The lowest place of a box over a disc.
 
 use nearmiss_geometry::nalgebra::Vector3;
 
@@ -12,28 +12,16 @@ type Vector = Vector3<f64>;
 const EDGES: [[f64; 2]; 3] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]];
 
 impl Solid<'_> {
-    /// The lowest place, against `out`, of a core that is a segment or a box within the cylinder over a
-    /// disc with that axis. `None` if the core is neither, or is beside the cylinder.
+    /// The lowest place, against `out`, of a core that is a box within the cylinder over a disc with that
+    /// axis. `None` if the core is something else, or is beside the cylinder.
     pub(crate) fn lowest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-        if self.is_point() || !self.is_box() {
+        if self.is_segment() || !self.is_box() {
             return None;
-        }
-        if self.is_segment() {
-            return self.lowest_of_segment(disc, out);
         }
         // In the frame of the box.
         let own = |v: &Vector| Vector::from(self.axes.map(|axis| axis.dot(v)));
         let place = lowest_of_box(&self.half, (own(&(disc.centre - self.centre)), disc.radius), own(out))?;
         Some((0..3).fold(self.centre, |x, k| x + self.axes[k] * place[k]))
-    }
-
-    fn lowest_of_segment(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-        let across = |v: Vector| v - out * out.dot(&v);
-        let edge = self.axes[0] * self.half.x;
-        let (from, way) = (across(self.centre - disc.centre), across(edge));
-        let c = from.norm_squared() - disc.radius * disc.radius;
-        let [low, high] = least_range(way.norm_squared(), from.dot(&way), c)?;
-        Some(self.centre + edge * if out.dot(&edge) < 0.0 { high } else { low })
     }
 }
 
@@ -193,32 +181,5 @@ mod tests {
             }
         }
         assert!(over > 2000 && beside > 1000 && close > 1500, "{over} over, {beside} beside, {close} close");
-    }
-
-    /// Likewise of segments, in closed form: the core is met by the cylinder in a part of the segment.
-    #[test]
-    fn no_place_of_a_segment_over_a_disc_is_lower() {
-        let rng = &mut rng(7356);
-        let mut over = 0;
-        for round in 0..3000 {
-            let ends = [point_in(rng, 1.0), point_in(rng, 1.0)];
-            let solid = Solid::new(&Shape::Capsule { ends, radius: 0.0 }, &Pose::IDENTITY).unwrap();
-            let normal = Vector::from(unit_vector(rng));
-            let disc = FlatDisc { centre: point_in(rng, 0.7).into(), normal, radius: [0.05, 0.5][round % 2] };
-            let [p, q] = ends.map(Vector::from);
-            let heights = (0..=2000).filter_map(|n| {
-                let away = p + (q - p) * (f64::from(n) / 2000.0) - disc.centre;
-                let height = normal.dot(&away);
-                ((away - normal * height).norm() <= disc.radius).then_some(height)
-            });
-            let expected = heights.reduce(f64::min);
-            let found = solid.lowest_over(&disc, &normal).map(|x| normal.dot(&(x - disc.centre)));
-            if let Some(least) = expected {
-                over += 1;
-                let found = found.unwrap_or(f64::INFINITY);
-                assert!(found <= least + 1e-9 && found > least - 2e-3, "round {round}: {found} {least}");
-            }
-        }
-        assert!(over > 500, "{over} over");
     }
 }

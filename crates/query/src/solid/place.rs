@@ -5,6 +5,7 @@ use nearmiss_hierarchy::{PointKind, THICKNESS};
 
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::{Gap, Solid};
+use crate::solid::deepest::Deepest;
 use crate::solid::elements::{Element, Elements};
 
 type Vector = Vector3<f64>;
@@ -38,22 +39,78 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
     };
     let out = disc.normal * sign;
     let most = solid.radius + elements.margin.max(f64::from(THICKNESS) * disc.radius);
-    let is_edge = elements.placed.scan().kind(i) == PointKind::Edge;
-    if let Some(lowest) = solid.lowest_over(&disc, &out) {
+    let place = if elements.placed.scan().kind(i) == PointKind::Edge {
+        by_nearest(solid, &disc, out, (most, elements.margin), true)
+    } else {
+        over_disc(solid, &disc, out, (most, elements.margin))
+    };
+    // The part of the shape over the disc may be far above it, while another part is at the rim.
+    place.filter(|it| it.depth >= solid.radius - most)
+}
+
+/// The deepest place of a shape over a disc. `None` if the core is further than `most` from the disc, or no
+/// part of the shape is over the disc. A round part that is beside the disc must be within the margin.
+pub(crate) fn over_disc(
+    solid: &Solid<'_>,
+    disc: &FlatDisc,
+    out: Vector,
+    (most, margin): (f64, f64),
+) -> Option<Place> {
+    if solid.is_segment() {
+        let found = solid.deepest_over(disc, &out)?;
+        let place = of_segment(solid, &found, out);
+        let apart_sq = found.height * found.height + found.beside * found.beside;
+        let is_met = (found.beside == 0.0 || place.depth >= -margin)
+            && (apart_sq <= most * most || solid.reaches(disc, most).is_some());
+        return is_met.then_some(place);
+    }
+    if let Some(lowest) = solid.lowest_over(disc, &out) {
         let height = out.dot(&(lowest - disc.centre));
-        let is_exact = height <= 0.0 || (solid.radius == 0.0 && !is_edge);
-        if is_exact {
+        if height <= 0.0 || solid.radius == 0.0 {
             let point = lowest - out * height;
             let is_met =
-                height <= most && (solid.distance(&point) <= most || solid.reaches(&disc, most).is_some());
+                height <= most && (solid.distance(&point) <= most || solid.reaches(disc, most).is_some());
             return is_met.then_some(Place { point, normal: out, depth: solid.radius - height });
         }
-    } else if solid.radius == 0.0 && solid.is_box() && !solid.is_point() && !is_edge {
+    } else if solid.radius == 0.0 && solid.is_box() {
         return None;
     }
-    let gap = disc_gap(solid, &disc, most)?;
-    // The part of the shape over the disc may be far above it, while another part is at the rim.
-    of_disc(solid, &gap, &disc, (out, is_edge, elements.margin)).filter(|it| it.depth >= solid.radius - most)
+    by_nearest(solid, disc, out, (most, margin), false)
+}
+
+/// The place of a shape by the nearest points of core and disc: at the border of a sheet along the way
+/// between them. If the core is not before the disc, the deepest place over the disc.
+fn by_nearest(
+    solid: &Solid<'_>,
+    disc: &FlatDisc,
+    out: Vector,
+    (most, margin): (f64, f64),
+    is_border: bool,
+) -> Option<Place> {
+    let gap = disc_gap(solid, disc, most)?;
+    let way = gap.on_core - gap.on_disc;
+    let (length, height) = (gap.distance, out.dot(&way));
+    if height <= 0.0 || length <= PRECISION * disc.radius {
+        return deepest(solid, disc, out);
+    }
+    let at = |normal: Vector, depth: f64| Some(Place { point: gap.on_disc, normal, depth });
+    let beside_sq = (way - out * height).norm_squared();
+    if beside_sq <= (PRECISION * length).powi(2) {
+        return at(out, solid.radius - height);
+    }
+    if is_border {
+        return at(way / length, solid.radius - length);
+    }
+    // The sphere about the nearest point of the core reaches this far below the rim. Not a number if it is
+    // beside the disc.
+    let depth = (solid.radius * solid.radius - beside_sq).sqrt() - height;
+    if depth >= -margin { at(out, depth) } else { None }
+}
+
+/// The place of a sphere or capsule over a disc.
+fn of_segment(solid: &Solid<'_>, found: &Deepest, normal: Vector) -> Place {
+    let below = (solid.radius * solid.radius - found.beside * found.beside).sqrt();
+    Place { point: found.on_disc, normal, depth: below - found.height }
 }
 
 /// The place of a shape that is only beside the disc of point `i`, within its thickness: no part of the
@@ -86,52 +143,18 @@ fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Opt
     Some(Place { point: centre + normal * radius, normal, depth }).filter(|it| it.depth.is_finite())
 }
 
-/// The contact with a disc: the deepest place of the shape over the disc. `None` if no part of the shape
-/// that is within the margin is over the disc.
-pub(crate) fn of_disc(
-    solid: &Solid<'_>,
-    gap: &Gap,
-    disc: &FlatDisc,
-    (out, is_edge, margin): (Vector, bool, f64),
-) -> Option<Place> {
-    let way = gap.on_core - gap.on_disc;
-    let (length, height) = (way.norm(), out.dot(&way));
-    // The core is before the disc.
-    if height > 0.0 && length > PRECISION * disc.radius {
-        let at = |normal: Vector, depth: f64| Place { point: gap.on_disc, normal, depth };
-        let beside_sq = (way - out * height).norm_squared();
-        if beside_sq <= (PRECISION * length).powi(2) {
-            return Some(at(out, solid.radius - height));
-        }
-        if is_edge {
-            return Some(at(way / length, solid.radius - length));
-        }
-        // The sphere about the nearest point of the core reaches this far below the rim.
-        let below = solid.radius * solid.radius - beside_sq;
-        let depth = if below >= 0.0 { below.sqrt() - height } else { f64::NEG_INFINITY };
-        return (depth >= -margin).then(|| at(out, depth));
-    }
-    deepest(solid, disc, out)
-}
-
 /// The deepest place of the shape over a disc that crosses its core, or that it is behind of. `None` if no
 /// part of the shape is over the disc.
 fn deepest(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Option<Place> {
+    if solid.is_segment() {
+        return solid.deepest_over(disc, &out).map(|found| of_segment(solid, &found, out));
+    }
     let lowest = solid.support(&-out);
     let depth = -out.dot(&(lowest - disc.centre));
     let at = |point: Vector, depth: f64| Some(Place { point, normal: out, depth });
     let across = lowest - disc.centre + out * depth;
     if across.norm_squared() <= disc.radius * disc.radius {
         return at(disc.centre + across, depth + solid.radius);
-    }
-    if solid.is_point() {
-        let beside = across.norm();
-        let below_sq = solid.radius * solid.radius - (beside - disc.radius).powi(2);
-        return if below_sq < 0.0 {
-            None
-        } else {
-            at(disc.centre + across * (disc.radius / beside), depth + below_sq.sqrt())
-        };
     }
     if let Some(lowest) = solid.lowest_over(disc, &out) {
         let height = out.dot(&(lowest - disc.centre));
@@ -155,4 +178,45 @@ fn deepest(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Option<Place> {
     }
     let below = FlatDisc { centre: disc.centre - out * depth, ..*disc };
     at(solid.gap(&below, f64::INFINITY).on_disc + out * depth, depth)
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_geometry::Pose;
+    use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+    use rand::RngExt;
+
+    use super::*;
+    use crate::solid::shape::Shape;
+
+    /// A capsule has a place over a disc if it is near the disc, and not if it is wholly behind it.
+    #[test]
+    fn capsules_have_places_over_the_discs_that_they_touch() {
+        let rng = &mut rng(7361);
+        let (mut through, mut behind, mut before) = (0, 0, 0);
+        for round in 0..20_000 {
+            let normal = Vector::from(unit_vector(rng));
+            let disc =
+                FlatDisc { centre: point_in(rng, 0.5).into(), normal, radius: rng.random_range(0.1..0.5) };
+            let (radius, margin) = (rng.random_range(0.01..0.3), [0.0_f64, 0.1][round % 2]);
+            let ends = [point_in(rng, 1.5), point_in(rng, 1.5)];
+            let solid = Solid::new(&Shape::Capsule { ends, radius }, &Pose::IDENTITY).unwrap();
+            let most = radius + margin.max(0.05 * disc.radius);
+            let gap = solid.gap(&disc, f64::INFINITY);
+            let Some(deepest) = solid.deepest_over(&disc, &normal) else { continue };
+            let depth = (radius * radius - deepest.beside * deepest.beside).sqrt() - deepest.height;
+            if (gap.distance - most).abs() < 1e-9 || (deepest.beside > 0.0 && depth < -margin) {
+                continue;
+            }
+            let found = over_disc(&solid, &disc, normal, (most, margin));
+            assert_eq!(found.is_some(), gap.distance <= most, "round {round}: {gap:?} {solid:?} {disc:?}");
+            through += usize::from(found.is_some() && depth > 2.0 * radius + margin);
+            before += usize::from(found.is_some() && depth < radius);
+            behind += usize::from(found.is_none() && depth > 0.0);
+        }
+        assert!(
+            through > 400 && behind > 1000 && before > 500,
+            "{through} through, {behind} behind, {before} before"
+        );
+    }
 }

@@ -9,7 +9,7 @@ use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
 use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
-use crate::solid::place::{Place, of_disc};
+use crate::solid::place::{Place, over_disc};
 
 type Vector = Vector3<f64>;
 
@@ -33,9 +33,7 @@ pub(crate) fn refine(
     let (placed, band) = (&elements.placed, elements.band(i));
     let frame = placed.stored_to_world();
     let radius = f64::from(elements.arrays.discs.get(i));
-    let deepest = |disc: FlatDisc| {
-        of_disc(solid, &solid.gap(&disc, f64::INFINITY), &disc, (disc.normal, false, elements.margin))
-    };
+    let deepest = |disc: FlatDisc| over_disc(solid, &disc, disc.normal, (f64::INFINITY, elements.margin));
     let (mut x, own) = (contact.point, Vector::from(contact.normal));
     let is_before =
         own.dot(&(Vector::from(placed.stored_to_world().apply((*inside).into())) - Vector::from(x))) >= 0.0;
