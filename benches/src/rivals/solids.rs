@@ -7,7 +7,7 @@ use parry3d::query::{
     ContactManifold, ContactManifoldsWorkspace, DefaultQueryDispatcher, PersistentQueryDispatcher,
     Ray as Line, RayCast, distance, intersection_test,
 };
-use parry3d::shape::{Ball, Capsule, Cuboid, Shape as Solid, TriMesh};
+use parry3d::shape::{Ball, Capsule, Cuboid, Cylinder, Shape as Solid, TriMesh};
 
 use crate::Failure;
 use crate::rivals::trimesh::{mesh, placement, vector};
@@ -35,8 +35,8 @@ impl TriMeshTarget {
         Ok(Self { mesh: mesh(triangles)? })
     }
 
-    /// Returns `true` if a sphere, capsule or box touches a triangle. `false` for other shapes, and for
-    /// boxes the radius about them is ignored, as in the next methods.
+    /// Returns `true` if a sphere, capsule, box or cylinder touches a triangle. `false` for other shapes. The
+    /// radius about a box or a cylinder is ignored, as in the next methods.
     #[must_use]
     pub fn touches(&self, shape: &Shape<'_>) -> bool {
         let own = Placement::IDENTITY;
@@ -44,7 +44,7 @@ impl TriMeshTarget {
             .is_some_and(|found| found.is_ok_and(|found| found.intersecting))
     }
 
-    /// The distance from a sphere, capsule or box; 0 if it touches. Infinite for other shapes.
+    /// The distance from a sphere, capsule, box or cylinder; 0 if it touches. Infinite for other shapes.
     #[must_use]
     pub fn distance(&self, shape: &Shape<'_>) -> f64 {
         let own = Placement::IDENTITY;
@@ -53,7 +53,8 @@ impl TriMeshTarget {
             .map_or(f64::INFINITY, |found| f64::from(found.distance))
     }
 
-    /// The number of contacts with a sphere, capsule or box, in all manifolds. `working` is used again.
+    /// The number of contacts with a sphere, capsule, box or cylinder, in all manifolds. `working` is used
+    /// again.
     pub fn contacts(&self, shape: &Shape<'_>, working: &mut Manifolds) -> usize {
         let Manifolds { found, workspace } = working;
         found.clear();
@@ -74,7 +75,7 @@ impl TriMeshTarget {
     }
 }
 
-/// Asks a question about a sphere, capsule or box as parry's shape. `None` for other shapes.
+/// Asks a question about a sphere, capsule, box or cylinder as parry's shape. `None` for other shapes.
 #[expect(clippy::cast_possible_truncation, reason = "the rival works in single precision")]
 fn ask<T>(shape: &Shape<'_>, question: impl FnOnce(&Placement, &dyn Solid) -> T) -> Option<T> {
     Some(match *shape {
@@ -85,6 +86,9 @@ fn ask<T>(shape: &Shape<'_>, question: impl FnOnce(&Placement, &dyn Solid) -> T)
             question(&Placement::IDENTITY, &Capsule::new(vector(p), vector(q), radius as f32))
         }
         Shape::Box { pose, half, .. } => question(&placement(&pose), &Cuboid::new(vector(half))),
+        Shape::Cylinder { pose, half_height, radius, .. } => {
+            question(&placement(&pose), &Cylinder::new(half_height as f32, radius as f32))
+        }
         _ => return None,
     })
 }

@@ -133,9 +133,12 @@ fn measure(object: &Object, arguments: &Arguments) -> Result<(), Failure> {
     let targets = [&estimated, &certified];
     for (name, away) in [("in the bounding box", None), ("up to 3 r off", Some(3.0))] {
         let drawn = draw(object, (number, radius, seed), away);
-        for (kind, shapes) in
-            [("sphere", &drawn.spheres), ("capsule", &drawn.capsules), ("box", &drawn.boxes)]
-        {
+        for (kind, shapes) in [
+            ("sphere", &drawn.spheres),
+            ("capsule", &drawn.capsules),
+            ("box", &drawn.boxes),
+            ("cylinder", &drawn.cylinders),
+        ] {
             let ours = of_shapes(targets, shapes, passes);
             let [touch, proven, distance, manifold, hits] = ours.map(|x| x / count(number));
             let [mesh, apart, met, grid, tree] = rivals.told(shapes, passes);
@@ -219,6 +222,7 @@ struct Drawn {
     spheres: Vec<Shape<'static>>,
     capsules: Vec<Shape<'static>>,
     boxes: Vec<Shape<'static>>,
+    cylinders: Vec<Shape<'static>>,
     rays: Vec<Ray>,
 }
 
@@ -226,7 +230,8 @@ struct Drawn {
 fn draw(object: &Object, (number, radius, seed): (usize, f64, u64), away: Option<f64>) -> Drawn {
     let rng = &mut rng(seed);
     let bounds = object.cloud.bounds();
-    let mut drawn = Drawn { spheres: vec![], capsules: vec![], boxes: vec![], rays: vec![] };
+    let mut drawn =
+        Drawn { spheres: vec![], capsules: vec![], boxes: vec![], cylinders: vec![], rays: vec![] };
     for _ in 0..number {
         let centre = match away {
             None => [0, 1, 2].map(|k| rng.random_range(bounds.min[k]..bounds.max[k])),
@@ -242,6 +247,7 @@ fn draw(object: &Object, (number, radius, seed): (usize, f64, u64), away: Option
         drawn.capsules.push(Shape::Capsule { ends: [centre, end], radius });
         let pose = rotation(rng).with_translation(centre);
         drawn.boxes.push(Shape::Box { pose, half: [2.0 * radius, radius, 0.5 * radius], radius: 0.0 });
+        drawn.cylinders.push(Shape::Cylinder { pose, half_height: 2.0 * radius, radius, rounding: 0.0 });
         drawn.rays.push(Ray::new([0, 1, 2].map(|k| centre[k] - 3.0 * along[k]), along));
     }
     drawn

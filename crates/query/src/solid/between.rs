@@ -47,7 +47,7 @@ pub(crate) fn gap(a: &Solid<'_>, b: &Solid<'_>) -> ShapeGap {
     // Relative to the first, so that rounding is relative to the distance.
     let origin = a.centre;
     let support = |d: &Vector3<f64>| [a.support(d) - origin, b.support(&-d) - origin];
-    let Closest { points, distance, lower } = closest(support, a.inside - b.inside, f64::INFINITY);
+    let Closest { points, distance, lower } = closest(support, a.inside - b.inside, [0.0, f64::INFINITY]);
     let radii = a.radius + b.radius;
     let way = points[1] - points[0];
     let along = way.try_normalize(0.0).unwrap_or_else(Vector3::zeros);

@@ -141,6 +141,13 @@ impl CandidateBlocks {
         f64::from(block.most[lane])
     }
 
+    /// Lowers the upper bound on the depth.
+    pub(crate) fn set_most(&mut self, Candidate(n): Candidate, most: f64) {
+        #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+        let most = (most as f32).next_up();
+        self.0[n as usize / WIDTH].most[n as usize % WIDTH] = most;
+    }
+
     /// The number of the candidate's place, if that is known.
     pub(crate) fn place(&self, candidate: Candidate) -> Option<usize> {
         let (block, lane) = self.at(candidate);

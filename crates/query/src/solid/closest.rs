@@ -46,9 +46,13 @@ struct Simplex {
 
 /// Finds the nearest points of two convex shapes. `support` returns the point of the first shape
 /// furthest along a direction, and the point of the second furthest against it. `start` is the
-/// difference of any point of the first and any of the second. Ends early once the distance is known to
-/// exceed `beyond`.
-pub(crate) fn closest(support: impl Fn(&Vector) -> [Vector; 2], start: Vector, beyond: f64) -> Closest {
+/// difference of any point of the first and any of the second. Ends early once the distance is known to be
+/// at most `enough` or to exceed `beyond`.
+pub(crate) fn closest(
+    support: impl Fn(&Vector) -> [Vector; 2],
+    start: Vector,
+    [enough, beyond]: [f64; 2],
+) -> Closest {
     let vertex = |towards: &Vector| {
         let points = support(towards);
         Vertex { points, apart: points[0] - points[1] }
@@ -61,7 +65,7 @@ pub(crate) fn closest(support: impl Fn(&Vector) -> [Vector; 2], start: Vector, b
     for _ in 0..ROUNDS {
         let square = v.norm_squared();
         // Zero up to rounding.
-        if square.is_nan() || square <= ROUNDING * ROUNDING * size_sq {
+        if square.is_nan() || square <= ROUNDING * ROUNDING * size_sq || square.sqrt() <= enough {
             break;
         }
         let next = vertex(&-v);

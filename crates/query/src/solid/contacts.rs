@@ -23,7 +23,7 @@ use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
 use crate::solid::gather::{Gather, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
-use crate::solid::place::{Place, place_at, place_beside};
+use crate::solid::place::{Place, most_depth, place_at, place_beside};
 use crate::solid::probe::is_far;
 use crate::solid::refine::refine;
 use crate::solid::sides::Sides;
@@ -48,6 +48,7 @@ pub(crate) struct Candidates {
     found: CandidateBlocks,
     places: Vec<Met>,
     order: BinaryHeap<(u64, Candidate)>,
+    corners: Vec<[f32; 3]>,
 }
 
 /// A contact, where it is in the stored frame, and the index and the local radius of its point.
@@ -88,14 +89,15 @@ pub(crate) fn contacts(
         let own = hint.as_deref().and_then(|hint| hint.centre);
         let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
         let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
-        let Candidates { found, places, order } = candidates;
+        let Candidates { found, places, order, corners } = candidates;
         found.clear();
         places.clear();
         if !is_far(elements, solid) {
             let mut near = Near::new(elements, solid, false);
             near.limit(elements.margin);
             let starts = elements.starts(solid, elements.margin);
-            let search = &mut Gather { near, sides: &sides, found: &mut *found };
+            let core = solid.lane_core(corners);
+            let search = &mut Gather { near, sides: &sides, core, found: &mut *found };
             // The visitor never breaks.
             let _whole = near.descend(level, &starts, search);
         }
@@ -195,8 +197,15 @@ impl Selection<'_, '_> {
         while let Some(candidate) = self.next(Rank::Depth { is_front }) {
             let enough =
                 |Met { contact, band, .. }: &Met| (contact.depth + LEVEL * band) / self.elements.scale();
-            if best.is_some_and(|best| enough(&self.places[best]) >= self.found.most(candidate)) {
+            let least = best.map_or(f64::NEG_INFINITY, |best| enough(&self.places[best]));
+            if least >= self.found.most(candidate) {
                 break;
+            }
+            let i = self.found.point(candidate);
+            let most = most_depth(self.elements, self.solid, i, self.found.sign(candidate));
+            if least >= most {
+                self.found.set_most(candidate, most);
+                continue;
             }
             if let Some(own) = self.place(candidate)
                 && best.is_none_or(|best| self.places[best].deeper(&self.places[own]) == Ordering::Less)

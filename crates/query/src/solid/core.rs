@@ -44,6 +44,17 @@ pub(crate) struct Solid<'a> {
     pub(crate) inside: Vector,
 }
 
+/// A core, relative to the centre of its box, whose extents are bounded more closely than those of the box.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum LaneCore<'c> {
+    /// Nothing but its box is known.
+    Box,
+    /// A truncated cone about this axis: half its height and the radii below and above.
+    Round { axis: [f32; 3], half: f32, radii: [f32; 2] },
+    /// A hull of corners.
+    Corners(&'c [[f32; 3]]),
+}
+
 /// The nearest points of a core and a disc.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gap {
@@ -112,12 +123,20 @@ impl<'a> Solid<'a> {
                 let across = (other - along * along.dot(&other)).try_normalize(0.0);
                 let across = across.unwrap_or_else(|| frame(along)[1]);
                 let axes = [along, across, along.cross(&across)];
-                let (centre, half) = spanned(&axes, |d| extreme(corners.iter().copied(), d));
+                let own = corners.map(Into::into);
+                let (centre, half) = spanned(&axes, |d| extreme(&own, d));
                 (Core::Triangle(corners), centre, axes, half)
             }
             Shape::Hull { points, .. } => {
-                let of = |d: &Vector| extreme(points.iter().map(|&p| into(p)), d);
-                let (centre, half) = spanned(&upright, of);
+                let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+                for &p in points {
+                    let p = placed.apply_inverse(p);
+                    for k in 0..3 {
+                        (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
+                    }
+                }
+                let [low, high] = [low, high].map(Vector::from);
+                let (centre, half) = (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low);
                 (Core::Hull(points, placed, Vector::zeros()), centre, upright, half)
             }
             Shape::Own { map, .. } => {
@@ -205,10 +224,10 @@ impl<'a> Solid<'a> {
                 });
                 if d.dot(&(high - low)) > 0.0 { high } else { low }
             }
-            Core::Triangle(corners) => extreme(corners.into_iter(), d),
+            Core::Triangle(corners) => extreme(&corners.map(Into::into), d),
             Core::Hull(points, placed, shift) => {
                 let towards = Vector::from(placed.rotate((*d).into()));
-                let furthest = extreme(points.iter().map(|&p| Vector::from(p)), &towards);
+                let furthest = extreme(points, &towards);
                 Vector::from(placed.apply_inverse(furthest.into())) + shift
             }
             Core::Own(map, placed, shift) => {
@@ -238,7 +257,31 @@ impl<'a> Solid<'a> {
             Core::Hull(..) | Core::Own(..) => {
                 // Relative to x, so that rounding is relative to the distance.
                 let support = |d: &Vector| [self.support(d) - x, Vector::zeros()];
-                x + closest(support, self.inside - x, f64::INFINITY).points[0]
+                x + closest(support, self.inside - x, [0.0, f64::INFINITY]).points[0]
+            }
+        }
+    }
+
+    /// The core in single precision, relative to the centre of its box. `corners` is memory for that.
+    #[expect(clippy::cast_possible_truncation, reason = "as precise as the box in single precision")]
+    pub(crate) fn lane_core<'c>(&self, corners: &'c mut Vec<[f32; 3]>) -> LaneCore<'c> {
+        let single = |v: Vector| [v.x as f32, v.y as f32, v.z as f32];
+        corners.clear();
+        match self.core {
+            Core::Point | Core::Segment | Core::Box | Core::Own(..) => LaneCore::Box,
+            Core::Round(radii) => LaneCore::Round {
+                axis: single(self.axes[1]),
+                half: self.half.y as f32,
+                radii: radii.map(|radius| radius as f32),
+            },
+            Core::Triangle(own) => {
+                corners.extend(own.map(|corner| single(corner - self.centre)));
+                LaneCore::Corners(corners)
+            }
+            Core::Hull(points, placed, shift) => {
+                let own = |&p: &[f64; 3]| single(Vector::from(placed.apply_inverse(p)) + shift - self.centre);
+                corners.extend(points.iter().map(own));
+                LaneCore::Corners(corners)
             }
         }
     }
@@ -303,9 +346,18 @@ impl<'a> Solid<'a> {
                 Gap::of(found.on_triangle, found.on_disc)
             }
             Core::Box | Core::Round(_) => {
-                self.projected(disc).unwrap_or_else(|start| self.iterated(disc, start, beyond))
+                self.projected(disc).unwrap_or_else(|start| self.iterated(disc, start, [0.0, beyond]))
             }
-            Core::Hull(..) | Core::Own(..) => self.iterated(disc, self.inside - disc.centre, beyond),
+            Core::Hull(..) | Core::Own(..) => self.iterated(disc, self.inside - disc.centre, [0.0, beyond]),
+        }
+    }
+
+    /// Two points of the core and a disc that are at most `within` apart, if there are any; otherwise any
+    /// two.
+    pub(crate) fn gap_within(&self, disc: &FlatDisc, within: f64) -> Gap {
+        match self.core {
+            Core::Point | Core::Segment | Core::Triangle(_) => self.gap(disc, within),
+            _ => self.iterated(disc, self.inside - disc.centre, [within, within]),
         }
     }
 
@@ -323,8 +375,9 @@ impl<'a> Solid<'a> {
             return Closest { points: [self.centre, foot + origin], distance, lower };
         }
         let start = self.inside - origin - (own[1] + own[2]) / 3.0;
-        let support = |d: &Vector| [self.support(d) - origin, extreme(own.into_iter(), &-d)];
-        let Closest { points, distance, lower } = closest(support, start, beyond);
+        let of_triangle = own.map(Into::into);
+        let support = |d: &Vector| [self.support(d) - origin, extreme(&of_triangle, &-d)];
+        let Closest { points, distance, lower } = closest(support, start, [0.0, beyond]);
         Closest { points: points.map(|p| p + origin), distance, lower }
     }
 
@@ -353,11 +406,11 @@ impl<'a> Solid<'a> {
     }
 
     /// The nearest points of the core and a disc by their support maps.
-    fn iterated(&self, disc: &FlatDisc, start: Vector, beyond: f64) -> Gap {
+    fn iterated(&self, disc: &FlatDisc, start: Vector, ends: [f64; 2]) -> Gap {
         // Relative to the centre of the disc, so that rounding is relative to the distance.
         let centre = disc.centre;
         let support = |d: &Vector| [self.support(d) - centre, disc.rim(&-d)];
-        let Closest { points, distance, lower } = closest(support, start, beyond);
+        let Closest { points, distance, lower } = closest(support, start, ends);
         Closest { points: points.map(|p| p + centre), distance, lower }.into()
     }
 }
@@ -371,9 +424,15 @@ fn frame(along: Vector) -> [Vector; 3] {
 }
 
 /// The first of the points that are furthest along `d`.
-fn extreme(points: impl Iterator<Item = Vector>, d: &Vector) -> Vector {
-    let furthest = points.map(|p| (p.dot(d), p)).reduce(|best, own| if own.0 > best.0 { own } else { best });
-    furthest.map_or_else(Vector::zeros, |(_, p)| p)
+fn extreme(points: &[[f64; 3]], d: &Vector) -> Vector {
+    let (mut most, mut first) = (f64::NEG_INFINITY, 0);
+    for (i, p) in points.iter().enumerate() {
+        let own = p[0] * d.x + p[1] * d.y + p[2] * d.z;
+        if own > most {
+            (most, first) = (own, i);
+        }
+    }
+    points.get(first).map_or_else(Vector::zeros, |&p| p.into())
 }
 
 /// The centre and half the edge lengths of a box along `axes` about a shape with this support map.

@@ -34,7 +34,7 @@ pub(crate) fn overlap(a: &Solid<'_>, b: &Solid<'_>) -> Overlap {
         let [on_a, on_b] = points(d);
         on_b - on_a
     };
-    let apart = closest(|d| points(&-d), a.inside - b.inside, f64::INFINITY);
+    let apart = closest(|d| points(&-d), a.inside - b.inside, [0.0, f64::INFINITY]);
     let size = a.half.amax() + b.half.amax();
     let between = (apart.points[1] - apart.points[0]).try_normalize(0.0).unwrap_or_else(Vector::zeros);
     if apart.distance > 1e-9 * size {

@@ -7,13 +7,11 @@ use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::{Gap, Solid};
 use crate::solid::deepest::Deepest;
 use crate::solid::elements::{Element, Elements};
+use crate::solid::portal::Lowest;
 
 type Vector = Vector3<f64>;
 
-/// Steps to the deepest place over a disc; two are enough over a plane.
-const ROUNDS: u32 = 8;
-
-/// The precision of a depth, in disc radii.
+/// The precision of a distance, in disc radii.
 const PRECISION: f64 = 1e-3;
 
 /// A place where a shape touches the surface.
@@ -40,12 +38,23 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
     let out = disc.normal * sign;
     let most = solid.radius + elements.margin.max(f64::from(THICKNESS) * disc.radius);
     let place = if elements.placed.scan().kind(i) == PointKind::Edge {
-        by_nearest(solid, &disc, out, (most, elements.margin), true)
+        at_border(solid, &disc, out, most)
     } else {
         over_disc(solid, &disc, out, (most, elements.margin))
     };
     // The part of the shape over the disc may be far above it, while another part is at the rim.
     place.filter(|it| it.depth >= solid.radius - most)
+}
+
+/// An upper bound on the depth over the disc of point `i`, whose normal in the direction in which the shape
+/// moves out has this sign: the depth of the lowest point of the shape. Infinite for shapes of which bounds
+/// from their boxes are as good, and for balls.
+pub(crate) fn most_depth(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sign: f64) -> f64 {
+    if solid.is_box() || !elements.is_disc(i) || elements.placed.scan().kind(i) == PointKind::Edge {
+        return f64::INFINITY;
+    }
+    let out = elements.normal(i) * sign;
+    solid.radius - out.dot(&(solid.support(&-out) - elements.position(i)))
 }
 
 /// The deepest place of a shape over a disc. `None` if the core is further than `most` from the disc, or no
@@ -75,36 +84,36 @@ pub(crate) fn over_disc(
     } else if solid.radius == 0.0 && solid.is_box() {
         return None;
     }
-    by_nearest(solid, disc, out, (most, margin), false)
+    let found = solid.lowest_place(disc, &out)?;
+    let place = of_lowest(&found, out);
+    // What is over the disc is convex: there is a place at each height between those of two others.
+    let is_near = found.other >= solid.radius - most;
+    let is_met =
+        (!found.is_beside || place.depth >= -margin) && (is_near || solid.reaches(disc, most).is_some());
+    is_met.then_some(place)
 }
 
-/// The place of a shape by the nearest points of core and disc: at the border of a sheet along the way
-/// between them. If the core is not before the disc, the deepest place over the disc.
-fn by_nearest(
-    solid: &Solid<'_>,
-    disc: &FlatDisc,
-    out: Vector,
-    (most, margin): (f64, f64),
-    is_border: bool,
-) -> Option<Place> {
+/// The place of a shape at a disc at the border of a sheet: along the way between the nearest points of core
+/// and disc or, if the core is not before the disc, the deepest place over the disc.
+fn at_border(solid: &Solid<'_>, disc: &FlatDisc, out: Vector, most: f64) -> Option<Place> {
     let gap = disc_gap(solid, disc, most)?;
     let way = gap.on_core - gap.on_disc;
     let (length, height) = (gap.distance, out.dot(&way));
     if height <= 0.0 || length <= PRECISION * disc.radius {
-        return deepest(solid, disc, out);
+        return if solid.is_segment() {
+            solid.deepest_over(disc, &out).map(|found| of_segment(solid, &found, out))
+        } else {
+            solid.lowest_place(disc, &out).map(|found| of_lowest(&found, out))
+        };
     }
-    let at = |normal: Vector, depth: f64| Some(Place { point: gap.on_disc, normal, depth });
-    let beside_sq = (way - out * height).norm_squared();
-    if beside_sq <= (PRECISION * length).powi(2) {
-        return at(out, solid.radius - height);
-    }
-    if is_border {
-        return at(way / length, solid.radius - length);
-    }
-    // The sphere about the nearest point of the core reaches this far below the rim. Not a number if it is
-    // beside the disc.
-    let depth = (solid.radius * solid.radius - beside_sq).sqrt() - height;
-    if depth >= -margin { at(out, depth) } else { None }
+    let is_over = (way - out * height).norm_squared() <= (PRECISION * length).powi(2);
+    let (normal, apart) = if is_over { (out, height) } else { (way / length, length) };
+    Some(Place { point: gap.on_disc, normal, depth: solid.radius - apart })
+}
+
+/// The place of a shape at its lowest point over a disc.
+fn of_lowest(found: &Lowest, normal: Vector) -> Place {
+    Place { point: found.on_disc, normal, depth: -found.height }
 }
 
 /// The place of a sphere or capsule over a disc.
@@ -141,43 +150,6 @@ fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Opt
     let inside = if way == Vector::zeros() { -normal.dot(&(solid.support(&-normal) - centre)) } else { 0.0 };
     let depth = solid.radius + radius - way.norm() + inside;
     Some(Place { point: centre + normal * radius, normal, depth }).filter(|it| it.depth.is_finite())
-}
-
-/// The deepest place of the shape over a disc that crosses its core, or that it is behind of. `None` if no
-/// part of the shape is over the disc.
-fn deepest(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Option<Place> {
-    if solid.is_segment() {
-        return solid.deepest_over(disc, &out).map(|found| of_segment(solid, &found, out));
-    }
-    let lowest = solid.support(&-out);
-    let depth = -out.dot(&(lowest - disc.centre));
-    let at = |point: Vector, depth: f64| Some(Place { point, normal: out, depth });
-    let across = lowest - disc.centre + out * depth;
-    if across.norm_squared() <= disc.radius * disc.radius {
-        return at(disc.centre + across, depth + solid.radius);
-    }
-    if let Some(lowest) = solid.lowest_over(disc, &out) {
-        let height = out.dot(&(lowest - disc.centre));
-        return at(lowest - out * height, solid.radius - height);
-    }
-    // The disc moves up from below the shape until the core is within the radius.
-    let mut depth = depth + solid.radius;
-    for _ in 0..ROUNDS {
-        let below = FlatDisc { centre: disc.centre - out * depth, ..*disc };
-        let gap = solid.gap(&below, f64::INFINITY);
-        let left = gap.distance - solid.radius;
-        if left <= PRECISION * disc.radius {
-            return at(gap.on_disc + out * depth, depth);
-        }
-        let rise = out.dot(&(gap.on_core - gap.on_disc));
-        if rise <= PRECISION * gap.distance {
-            return None;
-        }
-        // No place of the core is below the plane through the nearest point, across the way to it.
-        depth -= left * gap.distance / rise;
-    }
-    let below = FlatDisc { centre: disc.centre - out * depth, ..*disc };
-    at(solid.gap(&below, f64::INFINITY).on_disc + out * depth, depth)
 }
 
 #[cfg(test)]

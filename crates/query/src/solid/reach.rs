@@ -16,7 +16,7 @@ impl Solid<'_> {
         match self.project(disc, within) {
             ControlFlow::Break(found) => found,
             ControlFlow::Continue(()) => {
-                let gap = self.gap(disc, within);
+                let gap = self.gap_within(disc, within);
                 if gap.distance > within { None } else { Some(gap.on_disc) }
             }
         }
