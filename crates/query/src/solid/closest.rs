@@ -57,12 +57,16 @@ pub(crate) fn closest(
         let points = support(towards);
         Vertex { points, apart: points[0] - points[1] }
     };
-    let first = if start.norm_squared() > 0.0 { start } else { Vector::x() };
-    let first = vertex(&-first);
+    let start = if start.norm_squared() > 0.0 { start } else { Vector::x() };
+    let first = vertex(&-start);
     let mut simplex = Simplex { vertices: [first; 4], weights: [1.0, 0.0, 0.0, 0.0], count: 1 };
-    let (mut v, mut lower) = (first.apart, 0.0_f64);
+    // The plane across a good start tells most.
+    let (mut v, mut lower) = (first.apart, (start.dot(&first.apart) / start.norm()).max(0.0));
     let mut size_sq = v.norm_squared();
     for _ in 0..ROUNDS {
+        if lower > beyond {
+            break;
+        }
         let square = v.norm_squared();
         // Zero up to rounding.
         if square.is_nan() || square <= ROUNDING * ROUNDING * size_sq || square.sqrt() <= enough {
@@ -71,7 +75,7 @@ pub(crate) fn closest(
         let next = vertex(&-v);
         let along = v.dot(&next.apart);
         lower = lower.max(along / square.sqrt());
-        if square - along <= PRECISION * square || lower > beyond || simplex.has(&next.apart) {
+        if square - along <= PRECISION * square || simplex.has(&next.apart) {
             break;
         }
         size_sq = size_sq.max(next.apart.norm_squared());
