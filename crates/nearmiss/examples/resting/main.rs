@@ -1,4 +1,5 @@
-//! A ball, a box and a capsule fall on a scanned surface and come to rest: how much energy is left?
+//! A ball, a box, a cylinder and a capsule fall on a scanned surface and come to rest: how much energy is
+//! left?
 //!
 //! `cargo run --release -p nearmiss --example resting [SCAN.ply]`, z up
 #![expect(clippy::print_stdout, reason = "a program for people")]
@@ -33,6 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let kinds = [
         ("ball", Kind::Ball { radius: size }),
         ("box", Kind::Box { half: [size, 0.8 * size, 0.6 * size] }),
+        ("cylinder", Kind::Cylinder { half: size, radius: 0.5 * size }),
         ("capsule", Kind::Capsule { half: size, radius: 0.5 * size }),
     ];
     for (name, kind) in kinds {

@@ -13,7 +13,7 @@ const ITERATIONS: u32 = 30;
 const PUSH: f64 = 0.2;
 const SLOP: f64 = 1e-3;
 
-/// A ball, box or capsule of mass 1.
+/// A ball, box, cylinder or capsule of mass 1.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind {
     Ball {
@@ -21,6 +21,11 @@ pub(crate) enum Kind {
     },
     Box {
         half: [f64; 3],
+    },
+    /// Along its own y axis.
+    Cylinder {
+        half: f64,
+        radius: f64,
     },
     /// Along its own x axis.
     Capsule {
@@ -35,6 +40,10 @@ impl Kind {
         match self {
             Self::Ball { radius } => Vector::repeat(0.4 * radius * radius),
             Self::Box { half: [x, y, z] } => Vector::new(y * y + z * z, z * z + x * x, x * x + y * y) / 3.0,
+            Self::Cylinder { half, radius } => {
+                let across = 0.25 * radius * radius + half * half / 3.0;
+                Vector::new(across, 0.5 * radius * radius, across)
+            }
             // A cylinder and a ball, by volume.
             Self::Capsule { half, radius } => {
                 let (of_ball, of_cylinder) = (4.0 / 3.0 * radius, 2.0 * half);
@@ -86,12 +95,13 @@ impl Body {
     }
 
     fn shape(&self) -> Shape<'static> {
+        let q = self.turn.coords;
+        let pose = Pose::new(self.place.into(), [q.x, q.y, q.z, q.w]);
         match self.kind {
             Kind::Ball { radius } => Shape::Sphere { centre: self.place.into(), radius },
-            Kind::Box { half } => {
-                let q = self.turn.coords;
-                let pose = Pose::new(self.place.into(), [q.x, q.y, q.z, q.w]);
-                Shape::Box { pose, half, radius: 0.0 }
+            Kind::Box { half } => Shape::Box { pose, half, radius: 0.0 },
+            Kind::Cylinder { half, radius } => {
+                Shape::Cylinder { pose, half_height: half, radius, rounding: 0.0 }
             }
             Kind::Capsule { half, radius } => {
                 let along = self.turn * Vector::x() * half;

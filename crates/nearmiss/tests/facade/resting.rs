@@ -43,6 +43,7 @@ fn bodies_come_to_rest_on_a_scan() {
         for (kind, resistance) in [
             (Kind::Ball { radius: size }, 0.01),
             (Kind::Box { half: [size, 0.8 * size, 0.6 * size] }, 0.0),
+            (Kind::Cylinder { half: size, radius: 0.5 * size }, 0.01),
             (Kind::Capsule { half: size, radius: 0.5 * size }, 0.01),
         ] {
             let left = energy_left(&target, kind, (size, resistance));

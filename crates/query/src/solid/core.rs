@@ -128,15 +128,7 @@ impl<'a> Solid<'a> {
                 (Core::Triangle(corners), centre, axes, half)
             }
             Shape::Hull { points, .. } => {
-                let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-                for &p in points {
-                    let p = placed.apply_inverse(p);
-                    for k in 0..3 {
-                        (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
-                    }
-                }
-                let [low, high] = [low, high].map(Vector::from);
-                let (centre, half) = (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low);
+                let (centre, half) = upright_box(points.iter().map(|&p| into(p)));
                 (Core::Hull(points, placed, Vector::zeros()), centre, upright, half)
             }
             Shape::Own { map, .. } => {
@@ -189,6 +181,11 @@ impl<'a> Solid<'a> {
 
     pub(crate) fn is_point(&self) -> bool {
         matches!(self.core, Core::Point)
+    }
+
+    /// The radii below and above of a core that is a truncated cone about the second axis.
+    pub(crate) fn round_ends(&self) -> Option<[f64; 2]> {
+        if let Core::Round(radii) = self.core { Some(radii) } else { None }
     }
 
     /// Returns `true` if the nearest point of the core is known without an iteration.
@@ -433,6 +430,13 @@ fn extreme(points: &[[f64; 3]], d: &Vector) -> Vector {
         }
     }
     points.get(first).map_or_else(Vector::zeros, |&p| p.into())
+}
+
+/// The centre and half the edge lengths of the upright box about points.
+fn upright_box(points: impl Iterator<Item = Vector>) -> (Vector, Vector) {
+    let none = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
+    let (low, high) = points.fold(none, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low)
 }
 
 /// The centre and half the edge lengths of a box along `axes` about a shape with this support map.

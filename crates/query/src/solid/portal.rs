@@ -4,7 +4,7 @@
 //! of the disc is at the height of the lowest place over the disc. A triangle with vertices in the body that
 //! the axis crosses tells a height that is not too low. The point of the body that is furthest below the
 //! plane of the triangle tells how much lower the place may be, and takes the place of a vertex (after
-//! Snethen, "XenoCollide", Game Programming Gems 7, 2008; there the ray is one from inside the body).
+//! Snethen 2008; there the ray is one from inside the body).
 
 use nearmiss_geometry::nalgebra::Vector3;
 
@@ -22,6 +22,9 @@ const PRECISION: f64 = 1e-3;
 /// A triangle is too narrow if its area, seen along the axis, is less than this share of the squared length
 /// of an edge.
 const NARROW: f64 = 1e-9;
+
+/// The sine of the angle of a flat end and a disc below which they are parallel.
+const FLAT: f64 = 1e-9;
 
 /// The lowest place of a shape over a disc.
 #[derive(Debug, Clone, Copy)]
@@ -63,8 +66,39 @@ impl Solid<'_> {
         if across.norm_squared() <= disc.radius * disc.radius {
             return Some(Lowest { height, on_disc: disc.centre + across, is_beside: false, other: height });
         }
+        if let Some(found) = self.lowest_of_end(disc, out) {
+            return Some(found);
+        }
         let triangle = body.about_axis(low)?;
         Some(body.lowest(triangle))
+    }
+
+    /// The lowest place if that is on the flat end of a cylinder or cone, which the whole shape is above.
+    fn lowest_of_end(&self, disc: &FlatDisc, out: &Vector) -> Option<Lowest> {
+        /// The cosine of the axes of the shape and of the disc below which the end is too steep.
+        const STEEP: f64 = 1e-3;
+        let [below, above] = self.round_ends()?;
+        let rise = out.dot(&self.axes[1]);
+        if rise.abs() < STEEP {
+            return None;
+        }
+        // Into the shape from the end that looks down.
+        let (inwards, rise, radius) =
+            if rise > 0.0 { (self.axes[1], rise, below) } else { (-self.axes[1], -rise, above) };
+        let centre = self.centre - inwards * (self.half.y + self.radius) - disc.centre;
+        let across = inwards - out * rise;
+        let slope = across.norm();
+        // Where the plane of the end is lowest over the disc or, if it is level, nearest to the centre of the
+        // end.
+        let on_disc = if slope > FLAT {
+            across * (disc.radius / slope)
+        } else {
+            let way = centre - out * out.dot(&centre);
+            way * (disc.radius / way.norm().max(disc.radius))
+        };
+        let height = inwards.dot(&(centre - on_disc)) / rise;
+        let is_on = (on_disc + out * height - centre).norm_squared() <= radius * radius;
+        is_on.then(|| Lowest { height, on_disc: disc.centre + on_disc, is_beside: false, other: height })
     }
 }
 
@@ -209,7 +243,7 @@ mod tests {
             )
         };
         let mut best: Option<(f64, f64, f64)> = None;
-        let mut offer = |r: f64, angle: f64, best: &mut Option<(f64, f64, f64)>| {
+        let offer = |r: f64, angle: f64, best: &mut Option<(f64, f64, f64)>| {
             if let Some(height) = at(r, angle)
                 && best.is_none_or(|(least, ..)| height < least)
             {
