@@ -60,7 +60,7 @@ pub(crate) fn closest(
     let start = if start.norm_squared() > 0.0 { start } else { Vector::x() };
     let first = vertex(&-start);
     let mut simplex = Simplex { vertices: [first; 4], weights: [1.0, 0.0, 0.0, 0.0], count: 1 };
-    // The plane across a good start tells most.
+    // The plane across the start gives the first lower bound.
     let (mut v, mut lower) = (first.apart, (start.dot(&first.apart) / start.norm()).max(0.0));
     let mut size_sq = v.norm_squared();
     for _ in 0..ROUNDS {
@@ -94,7 +94,9 @@ pub(crate) fn closest(
     }
     let points = [0, 1].map(|k| simplex.combined(|vertex| vertex.points[k]));
     let distance = v.norm();
-    Closest { points, distance, lower: (lower - 4.0 * ROUNDING * size_sq.sqrt()).clamp(0.0, distance) }
+    // Also if a support map returns what is not a number.
+    let lower = (lower - 4.0 * ROUNDING * size_sq.sqrt()).max(0.0).min(distance);
+    Closest { points, distance, lower }
 }
 
 impl Simplex {

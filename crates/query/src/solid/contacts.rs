@@ -195,17 +195,18 @@ impl Selection<'_, '_> {
         let mut best: Option<usize> = None;
         self.tries = 0;
         while let Some(candidate) = self.next(Rank::Depth { is_front }) {
-            let enough =
-                |Met { contact, band, .. }: &Met| (contact.depth + LEVEL * band) / self.elements.scale();
-            let least = best.map_or(f64::NEG_INFINITY, |best| enough(&self.places[best]));
-            if least >= self.found.most(candidate) {
-                break;
-            }
-            let i = self.found.point(candidate);
-            let most = most_depth(self.elements, self.solid, i, self.found.sign(candidate));
-            if least >= most {
-                self.found.set_most(candidate, most);
-                continue;
+            if let Some(Met { contact, band, .. }) = best.map(|best| &self.places[best]) {
+                let scale = self.elements.scale();
+                if (contact.depth + LEVEL * band) / scale >= self.found.most(candidate) {
+                    break;
+                }
+                let i = self.found.point(candidate);
+                let most = most_depth(self.elements, self.solid, i, self.found.sign(candidate));
+                // It is not deeper than what is found later, either.
+                if contact.depth / scale >= most {
+                    self.found.set_most(candidate, most);
+                    continue;
+                }
             }
             if let Some(own) = self.place(candidate)
                 && best.is_none_or(|best| self.places[best].deeper(&self.places[own]) == Ordering::Less)
@@ -216,7 +217,7 @@ impl Selection<'_, '_> {
         best
     }
 
-    /// Returns the candidate that comes next, of all whose place is not known or that are removed otherwise.
+    /// Returns the next candidate. The caller computes its place, removes it or lowers its bound.
     fn next(&mut self, rank: Rank) -> Option<Candidate> {
         self.tries += 1;
         if self.tries <= SCANS {

@@ -2,9 +2,9 @@
 //!
 //! A sphere of radius R whose centre is h above the plane of a disc and x beside the disc reaches
 //! √(R² − x²) − h below the plane over the disc. Along the segment of a capsule this depth is concave.
-//! Let w be the way of the segment, u and σ its parts across and down, and e the distance from the axis
-//! of the disc, at least d on the line of the segment. The depth is greatest where its derivative is
-//! zero: for x = e − ρ > 0 at
+//! Let w be the way of the segment, u and σ its parts across and down, and e the distance of a point of
+//! the segment from the axis of the disc, whose radius is ρ. On the line of the segment e is at least d.
+//! The depth is greatest where its derivative is zero: for x = e − ρ > 0 at
 //!
 //! x = R σ / √(σ² + u² (1 − d²/e²)),
 //!

@@ -73,16 +73,11 @@ pub(crate) fn over_disc(
             && (apart_sq <= most * most || solid.reaches(disc, most).is_some());
         return is_met.then_some(place);
     }
-    if let Some(lowest) = solid.lowest_over(disc, &out) {
-        let height = out.dot(&(lowest - disc.centre));
-        if height <= 0.0 || solid.radius == 0.0 {
-            let point = lowest - out * height;
-            let is_met =
-                height <= most && (solid.distance(&point) <= most || solid.reaches(disc, most).is_some());
-            return is_met.then_some(Place { point, normal: out, depth: solid.radius - height });
-        }
-    } else if solid.radius == 0.0 && solid.is_box() {
-        return None;
+    if solid.is_box() && solid.radius == 0.0 {
+        let place = of_box(solid, disc, out)?;
+        let is_met = -place.depth <= most
+            && (solid.distance(&place.point) <= most || solid.reaches(disc, most).is_some());
+        return is_met.then_some(place);
     }
     let found = solid.lowest_place(disc, &out)?;
     let place = of_lowest(&found, out);
@@ -102,6 +97,8 @@ fn at_border(solid: &Solid<'_>, disc: &FlatDisc, out: Vector, most: f64) -> Opti
     if height <= 0.0 || length <= PRECISION * disc.radius {
         return if solid.is_segment() {
             solid.deepest_over(disc, &out).map(|found| of_segment(solid, &found, out))
+        } else if solid.is_box() && solid.radius == 0.0 {
+            of_box(solid, disc, out)
         } else {
             solid.lowest_place(disc, &out).map(|found| of_lowest(&found, out))
         };
@@ -109,6 +106,13 @@ fn at_border(solid: &Solid<'_>, disc: &FlatDisc, out: Vector, most: f64) -> Opti
     let is_over = (way - out * height).norm_squared() <= (PRECISION * length).powi(2);
     let (normal, apart) = if is_over { (out, height) } else { (way / length, length) };
     Some(Place { point: gap.on_disc, normal, depth: solid.radius - apart })
+}
+
+/// The place of a box without a radius over a disc.
+fn of_box(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Option<Place> {
+    let lowest = solid.lowest_over(disc, &out)?;
+    let height = out.dot(&(lowest - disc.centre));
+    Some(Place { point: lowest - out * height, normal: out, depth: -height })
 }
 
 /// The place of a shape at its lowest point over a disc.

@@ -13,7 +13,7 @@ use crate::solid::core::Solid;
 
 type Vector = Vector3<f64>;
 
-/// The greatest number of vertices that are tried for each of the two triangles.
+/// The greatest number of vertices that are tried in each of the three steps.
 const ROUNDS: u32 = 32;
 
 /// The search ends if the place is at most this much too high, in disc radii.
@@ -66,39 +66,53 @@ impl Solid<'_> {
         if across.norm_squared() <= disc.radius * disc.radius {
             return Some(Lowest { height, on_disc: disc.centre + across, is_beside: false, other: height });
         }
-        if let Some(found) = self.lowest_of_end(disc, out) {
-            return Some(found);
-        }
-        let triangle = body.about_axis(low)?;
-        Some(body.lowest(triangle))
+        self.lowest_of_face(disc, out).or_else(|| body.lowest(body.about_axis(low)?))
     }
 
-    /// The lowest place if that is on the flat end of a cylinder or cone, which the whole shape is above.
-    fn lowest_of_end(&self, disc: &FlatDisc, out: &Vector) -> Option<Lowest> {
-        /// The cosine of the axes of the shape and of the disc below which the end is too steep.
+    /// The lowest place if that is on a flat face of a box, a cylinder or a cone: the whole shape is above
+    /// it.
+    fn lowest_of_face(&self, disc: &FlatDisc, out: &Vector) -> Option<Lowest> {
+        /// The cosine of the axes of the face and of the disc below which the face is too steep.
         const STEEP: f64 = 1e-3;
-        let [below, above] = self.round_ends()?;
-        let rise = out.dot(&self.axes[1]);
-        if rise.abs() < STEEP {
-            return None;
-        }
-        // Into the shape from the end that looks down.
-        let (inwards, rise, radius) =
-            if rise > 0.0 { (self.axes[1], rise, below) } else { (-self.axes[1], -rise, above) };
-        let centre = self.centre - inwards * (self.half.y + self.radius) - disc.centre;
-        let across = inwards - out * rise;
-        let slope = across.norm();
-        // Where the plane of the end is lowest over the disc or, if it is level, nearest to the centre of the
-        // end.
-        let on_disc = if slope > FLAT {
-            across * (disc.radius / slope)
-        } else {
-            let way = centre - out * out.dot(&centre);
-            way * (disc.radius / way.norm().max(disc.radius))
+        let ends = self.round_ends();
+        let axes = match ends {
+            Some(_) => 1..2,
+            None if self.is_box() => 0..3,
+            None => 0..0,
         };
-        let height = inwards.dot(&(centre - on_disc)) / rise;
-        let is_on = (on_disc + out * height - centre).norm_squared() <= radius * radius;
-        is_on.then(|| Lowest { height, on_disc: disc.centre + on_disc, is_beside: false, other: height })
+        for k in axes {
+            let rise = out.dot(&self.axes[k]);
+            if rise.abs() < STEEP {
+                continue;
+            }
+            // From the face that looks down into the shape.
+            let (inwards, rise) = (self.axes[k] * 1.0_f64.copysign(rise), rise.abs());
+            let centre = self.centre - inwards * (self.half[k] + self.radius) - disc.centre;
+            let across = inwards - out * rise;
+            let slope = across.norm();
+            // Where the plane of the face is lowest over the disc or, if it is level, near the face's centre.
+            let on_disc = if slope > FLAT {
+                across * (disc.radius / slope)
+            } else {
+                let way = centre - out * out.dot(&centre);
+                way * (disc.radius / way.norm().max(disc.radius).max(f64::MIN_POSITIVE))
+            };
+            let height = inwards.dot(&(centre - on_disc)) / rise;
+            let on_face = on_disc + out * height - centre;
+            let is_on = match ends {
+                Some([below, above]) => {
+                    let radius = if inwards.dot(&self.axes[k]) > 0.0 { below } else { above };
+                    on_face.norm_squared() <= radius * radius
+                }
+                None => (0..3).all(|j| j == k || on_face.dot(&self.axes[j]).abs() <= self.half[j]),
+            };
+            if is_on {
+                // A radius about the face is above the core on one side.
+                let is_beside = self.radius > 0.0 && slope > FLAT;
+                return Some(Lowest { height, on_disc: disc.centre + on_disc, is_beside, other: height });
+            }
+        }
+        None
     }
 }
 
@@ -129,18 +143,20 @@ impl Body<'_> {
         }
         // The axis is on the left side of the way to `right`, if `side` is 1.
         let side = 1.0_f64.copysign(self.turn(&(right.apart - from), &-from));
-        let mut left = right;
+        let mut beyond = None;
         for _ in 0..ROUNDS {
             let across = self.out.cross(&(right.apart - from)) * side;
-            left = self.vertex(&across);
-            if across.dot(&left.apart) < 0.0 {
+            let next = self.vertex(&across);
+            if across.dot(&next.apart) < 0.0 {
                 return None;
             }
-            if self.turn(&(left.apart - from), &-from) * side <= 0.0 {
+            if self.turn(&(next.apart - from), &-from) * side <= 0.0 {
+                beyond = Some(next);
                 break;
             }
-            right = left;
+            right = next;
         }
+        let mut left = beyond?;
         for _ in 0..ROUNDS {
             // Away from the first point.
             let across = self.out.cross(&(right.apart - left.apart)) * side;
@@ -156,9 +172,10 @@ impl Body<'_> {
         None
     }
 
-    /// The lowest place, from a triangle of points of the body that the axis crosses.
-    fn lowest(&self, mut corners: [Vertex; 3]) -> Lowest {
-        let other = self.place(&corners).height;
+    /// The lowest place, from a triangle of points of the body that the axis crosses. `None` if that has no
+    /// area: the body is flat and upright.
+    fn lowest(&self, mut corners: [Vertex; 3]) -> Option<Lowest> {
+        let other = self.place(&corners)?.height;
         for _ in 0..ROUNDS {
             let [a, b, c] = corners.each_ref().map(|corner| &corner.apart);
             let (ab, ac) = (b - a, c - a);
@@ -182,15 +199,18 @@ impl Body<'_> {
                 [corners[2], corners[0], next]
             };
         }
-        Lowest { other, ..self.place(&corners) }
+        Some(Lowest { other, ..self.place(&corners)? })
     }
 
     /// The place where the axis crosses a triangle.
-    fn place(&self, corners: &[Vertex; 3]) -> Lowest {
+    fn place(&self, corners: &[Vertex; 3]) -> Option<Lowest> {
         let [a, b, c] = corners.each_ref().map(|corner| &corner.apart);
         let weights = [self.turn(b, c), self.turn(c, a), self.turn(a, b)].map(|weight| weight.max(0.0));
         let sum: f64 = weights.iter().sum();
-        let weights = if sum > 0.0 { weights.map(|weight| weight / sum) } else { [1.0, 0.0, 0.0] };
+        if sum.is_nan() || sum <= 0.0 {
+            return None;
+        }
+        let weights = weights.map(|weight| weight / sum);
         let combined = |of: fn(&Vertex) -> &Vector| {
             weights.iter().zip(corners).map(|(&weight, corner)| of(corner) * weight).sum::<Vector>()
         };
@@ -198,7 +218,7 @@ impl Body<'_> {
         let across_sq = (on_core - self.out * self.out.dot(&on_core)).norm_squared();
         let height = self.out.dot(&combined(|it| &it.apart));
         let is_beside = across_sq > self.disc.radius * self.disc.radius * (1.0 + 1e-6);
-        Lowest { height, on_disc: self.disc.centre + on_disc, is_beside, other: height }
+        Some(Lowest { height, on_disc: self.disc.centre + on_disc, is_beside, other: height })
     }
 }
 
