@@ -81,7 +81,7 @@ pub(crate) fn over_disc(
     }
     let found = solid.lowest_place(disc, &out)?;
     let place = of_lowest(&found, out);
-    // What is over the disc is convex: there is a place at each height between those of two others.
+    // The part of the shape over the disc is convex, so it has a place at each height between two others.
     let is_near = found.other >= solid.radius - most;
     let is_met =
         (!found.is_beside || place.depth >= -margin) && (is_near || solid.reaches(disc, most).is_some());
