@@ -293,8 +293,8 @@ mod tests {
             }
         }
         let mean: Vec<f64> = loose.iter().zip(over).map(|(sum, count)| sum / f64::from(count)).collect();
-        // Bounds of cones and hulls tell only the lowest point of the whole shape. The last kind, the pole, has
-        // no limit.
+        // Bounds of cones and hulls tell only the lowest point of the whole shape. The last kind, the pole,
+        // has no limit.
         let most = [0.3, 0.3, 0.3, 0.4, 0.5, 1.3, 1.8, 0.5];
         assert!(
             mean.iter().zip(most).all(|(&mean, most)| mean < most),
