@@ -24,6 +24,15 @@ pub(crate) struct Place {
     pub(crate) depth: f64,
 }
 
+/// The deepest place of a shape over a disc.
+struct Over {
+    place: Place,
+    /// `true` if the core is beside the disc there.
+    is_beside: bool,
+    /// The core is at most this far from the disc if the place is not further before it than that.
+    apart: f64,
+}
+
 /// The deepest place of a shape on the ball or over the disc of point `i`, whose normal in the direction in
 /// which the shape moves out has this sign. `None` if they are apart, or no part of the shape within the
 /// margin is over the disc.
@@ -65,27 +74,9 @@ pub(crate) fn over_disc(
     out: Vector,
     (most, margin): (f64, f64),
 ) -> Option<Place> {
-    if solid.is_segment() {
-        let found = solid.deepest_over(disc, &out)?;
-        let place = of_segment(solid, &found, out);
-        let apart_sq = found.height * found.height + found.beside * found.beside;
-        let is_met = (found.beside == 0.0 || place.depth >= -margin)
-            && (apart_sq <= most * most || solid.reaches(disc, most).is_some());
-        return is_met.then_some(place);
-    }
-    if solid.is_box() && solid.radius == 0.0 {
-        let place = of_box(solid, disc, out)?;
-        let is_met = -place.depth <= most
-            && (solid.distance(&place.point) <= most || solid.reaches(disc, most).is_some());
-        return is_met.then_some(place);
-    }
-    let found = solid.lowest_place(disc, &out)?;
-    let place = of_lowest(&found, out);
-    // The part of the shape over the disc is convex, so it has a place at each height between two others.
-    let is_near = found.other >= solid.radius - most;
-    let is_met =
-        (!found.is_beside || place.depth >= -margin) && (is_near || solid.reaches(disc, most).is_some());
-    is_met.then_some(place)
+    let Over { place, is_beside, apart } = deepest(solid, disc, out)?;
+    let is_within = place.depth >= solid.radius - most && (!is_beside || place.depth >= -margin);
+    (is_within && (apart <= most || solid.reaches(disc, most).is_some())).then_some(place)
 }
 
 /// The place of a shape at a disc at the border of a sheet: along the way between the nearest points of core
@@ -95,35 +86,33 @@ fn at_border(solid: &Solid<'_>, disc: &FlatDisc, out: Vector, most: f64) -> Opti
     let way = gap.on_core - gap.on_disc;
     let (length, height) = (gap.distance, out.dot(&way));
     if height <= 0.0 || length <= PRECISION * disc.radius {
-        return if solid.is_segment() {
-            solid.deepest_over(disc, &out).map(|found| of_segment(solid, &found, out))
-        } else if solid.is_box() && solid.radius == 0.0 {
-            of_box(solid, disc, out)
-        } else {
-            solid.lowest_place(disc, &out).map(|found| of_lowest(&found, out))
-        };
+        return deepest(solid, disc, out).map(|over| over.place);
     }
     let is_over = (way - out * height).norm_squared() <= (PRECISION * length).powi(2);
     let (normal, apart) = if is_over { (out, height) } else { (way / length, length) };
     Some(Place { point: gap.on_disc, normal, depth: solid.radius - apart })
 }
 
-/// The place of a box without a radius over a disc.
-fn of_box(solid: &Solid<'_>, disc: &FlatDisc, out: Vector) -> Option<Place> {
-    let lowest = solid.lowest_over(disc, &out)?;
-    let height = out.dot(&(lowest - disc.centre));
-    Some(Place { point: lowest - out * height, normal: out, depth: -height })
-}
-
-/// The place of a shape at its lowest point over a disc.
-fn of_lowest(found: &Lowest, normal: Vector) -> Place {
-    Place { point: found.on_disc, normal, depth: -found.height }
-}
-
-/// The place of a sphere or capsule over a disc.
-fn of_segment(solid: &Solid<'_>, found: &Deepest, normal: Vector) -> Place {
-    let below = (solid.radius * solid.radius - found.beside * found.beside).sqrt();
-    Place { point: found.on_disc, normal, depth: below - found.height }
+/// The deepest place of a shape over a disc, which the shape need not touch. `None` if no part of the shape
+/// is over the disc.
+fn deepest(solid: &Solid<'_>, disc: &FlatDisc, normal: Vector) -> Option<Over> {
+    if solid.is_segment() {
+        let Deepest { height, beside, on_disc } = solid.deepest_over(disc, &normal)?;
+        let depth = (solid.radius * solid.radius - beside * beside).sqrt() - height;
+        let apart = (height * height + beside * beside).sqrt();
+        return Some(Over { place: Place { point: on_disc, normal, depth }, is_beside: beside > 0.0, apart });
+    }
+    if solid.is_box() && solid.radius == 0.0 {
+        let lowest = solid.lowest_over(disc, &normal)?;
+        let height = normal.dot(&(lowest - disc.centre));
+        let point = lowest - normal * height;
+        let place = Place { point, normal, depth: -height };
+        return Some(Over { place, is_beside: false, apart: solid.distance(&point) });
+    }
+    let Lowest { height, on_disc, is_beside, other } = solid.lowest_place(disc, &normal)?;
+    let place = Place { point: on_disc, normal, depth: -height };
+    // The part of the shape over the disc is convex, so it has a place at each height between two others.
+    Some(Over { place, is_beside, apart: solid.radius - other })
 }
 
 /// The place of a shape that is only beside the disc of point `i`, within its thickness: no part of the
