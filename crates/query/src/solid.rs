@@ -24,6 +24,7 @@ pub(crate) mod overlap;
 pub(crate) mod place;
 pub(crate) mod placed;
 pub(crate) mod plan;
+pub(crate) mod plane;
 pub(crate) mod portal;
 pub(crate) mod probe;
 pub(crate) mod ray;

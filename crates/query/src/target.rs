@@ -109,7 +109,9 @@ impl<'a> Target<'a> {
     #[must_use]
     pub fn distance(&self, shape: &Shape<'_>, within: f64, scratch: &mut Scratch) -> Option<ShapeDistance> {
         let solid = self.solid(shape).filter(|_| self.is_proper);
-        distance(&self.elements, solid.as_ref(), within, scratch.level())
+        let level = scratch.level();
+        let corners = &mut scratch.contact.gathers[0].corners;
+        distance(&self.elements, solid.as_ref(), within, (level, corners))
     }
 
     /// Writes up to eight contacts of a shape with the scan to `out`. Clears `out` first.

@@ -7,6 +7,7 @@
 //! has a continuous derivative, whose zero is found by Newton's method.
 
 use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::THICKNESS;
 use nearmiss_mesh::{Corners, nearest_on_triangle, unit_normal};
 
 /// A flat disc.
@@ -27,6 +28,12 @@ pub(crate) struct Nearest {
 }
 
 impl FlatDisc {
+    /// The distance within which a shape touches the disc.
+    #[inline]
+    pub(crate) fn thickness(&self) -> f64 {
+        f64::from(THICKNESS) * self.radius
+    }
+
     /// The point of the disc nearest to `x`.
     pub(crate) fn nearest(&self, x: &Vector3<f64>) -> Vector3<f64> {
         let away = x - self.centre;

@@ -8,7 +8,7 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Part, THICKNESS, Tree};
+use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Part, Tree};
 use nearmiss_lanes::wide::{Bits, blocks_of, lanes_of};
 use nearmiss_mesh::{Corners, unit_normal};
 
@@ -270,7 +270,7 @@ impl<'s, 'a> Search<'s, 'a> {
             normal: normal.normalize(),
             radius: self.pair.a.discs.get(i).into(),
         };
-        let most = (self.margin / placed.scale()).max(f64::from(THICKNESS) * disc.radius);
+        let most = (self.margin / placed.scale()).max(disc.thickness());
         let Nearest { distance, on_triangle, on_disc } = disc.nearest_to(corners);
         if distance > most || distance.is_nan() {
             return None;

@@ -49,6 +49,7 @@ struct Course<'s, 'a> {
     /// The clearance in the world.
     clearance: f64,
     level: Level,
+    scratch: &'s mut ViewScratch,
     distances: u32,
 }
 
@@ -66,7 +67,7 @@ pub(crate) fn sweep(
     };
     let (min, max) = (Vector::from(min), Vector::from(max));
     let ball = (0.5 * (min + max), 0.5 * (max - min).norm());
-    let mut course = Course { elements, shape, motion, ball, clearance, level, distances: 0 };
+    let mut course = Course { elements, shape, motion, ball, clearance, level, scratch, distances: 0 };
     let verdict = match course.run() {
         Err(reason) => undecided(reason),
         Ok(Outcome::Told(verdict)) => verdict,
@@ -74,7 +75,7 @@ pub(crate) fn sweep(
             let t_hit = course.first_touch(apart, t_hit);
             let (moved, frame) = course.placed(t_hit);
             let solid = Solid::new(&moved, &frame);
-            contacts(elements, solid.as_ref(), None, found, (level, scratch, candidates));
+            contacts(elements, solid.as_ref(), None, found, (level, &mut *course.scratch, candidates));
             match (found.first(), course.at(t_hit)) {
                 (Some(&contact), _) => ShapeSweepVerdict::Impact { t_free, t_hit, contact },
                 (None, Ok(nearest)) => {
@@ -130,7 +131,8 @@ impl<'s> Course<'s, '_> {
         let solid = Solid::new(&moved, &frame).ok_or(SweepReason::Shape)?;
         self.distances += 1;
         // Without any disc or ball, nothing is known.
-        distance(self.elements, Some(&solid), f64::INFINITY, self.level).ok_or(SweepReason::Near)
+        let working = (self.level, &mut self.scratch.corners);
+        distance(self.elements, Some(&solid), f64::INFINITY, working).ok_or(SweepReason::Near)
     }
 
     /// A bound on the speed of any point of the shape: along a screw each has a constant speed.

@@ -11,6 +11,8 @@ use crate::pair::shape_index::ShapeIndex;
 /// Reusable memory for evaluations of f; never influences a result.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ViewScratch {
+    /// The corners of a shape near the scan.
+    pub(crate) corners: Vec<[f32; 3]>,
     pub(crate) gather: GatherScratch,
     kernel: KernelScratch,
 }

@@ -166,7 +166,9 @@ pub(crate) fn nearest_part(elements: &Elements<'_>, place: &Vector, level: Level
 
 /// The distance of a place of the stored frame from a scan, and the nearest place of the discs and balls.
 fn foot(elements: &Elements<'_>, place: &Vector, level: Level) -> Option<(f64, Vector)> {
-    let found = distance(elements, Some(&Solid::point(*place)), f64::INFINITY, level)?;
+    // A point has no corners.
+    let working = (level, &mut Vec::new());
+    let found = distance(elements, Some(&Solid::point(*place)), f64::INFINITY, working)?;
     let foot = elements.placed.stored_to_world().apply_inverse(found.points[0]);
     Some((found.lower / elements.scale(), foot.into()))
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::placed::PlacedMesh;
 use crate::solid::closest::Closest;
-use crate::solid::core::Solid;
+use crate::solid::core::{LaneCore, Solid};
 use crate::solid::lanes::LaneBox;
 
 type Vector = Vector3<f64>;
@@ -35,7 +35,7 @@ struct Search<'s, 'a, V> {
     origin: Vector,
     scale: f64,
     solid: &'s Solid<'s>,
-    lane_box: LaneBox,
+    lane_box: LaneBox<'s>,
     /// The distance of the shape up to which triangles are of interest.
     within: f64,
     /// The squared distance of the core beyond which boxes are skipped.
@@ -60,7 +60,7 @@ pub(crate) fn visit_near(
         origin: frame.origin.into(),
         scale: frame.scale,
         solid,
-        lane_box: LaneBox::new(solid, f64::from(far)),
+        lane_box: LaneBox::new(solid, f64::from(far), LaneCore::Box),
         within: f64::INFINITY,
         most_sq: f32::INFINITY,
         visit,

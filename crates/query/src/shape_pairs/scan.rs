@@ -85,7 +85,9 @@ impl<'a> ShapeScanPair<'a> {
     /// [`Target::distance`](crate::Target::distance).
     #[must_use]
     pub fn distance(&self, plan: &ShapePlan, within: f64, scratch: &mut Scratch) -> Option<ShapeDistance> {
-        self.ask(plan, |elements, solid| distance(elements, solid, within, scratch.level()))?
+        let level = scratch.level();
+        let corners = &mut scratch.contact.gathers[0].corners;
+        self.ask(plan, |elements, solid| distance(elements, solid, within, (level, corners)))?
     }
 
     /// Writes up to eight contacts of the shape with the scan to `out`. Clears `out` first; see

@@ -29,39 +29,29 @@ pub(crate) struct Closest {
     pub(crate) lower: f64,
 }
 
-/// A vertex of the simplex: a point of each shape, and their difference.
-#[derive(Debug, Clone, Copy)]
-struct Vertex {
-    points: [Vector; 2],
-    apart: Vector,
-}
-
 /// Up to four vertices, with weights that sum up to 1 and give the point nearest to the origin.
-#[derive(Debug, Clone, Copy)]
 struct Simplex {
-    vertices: [Vertex; 4],
+    /// The differences of the points of both shapes.
+    vertices: [Vector; 4],
+    points: [[Vector; 2]; 4],
     weights: [f64; 4],
     count: usize,
 }
 
 /// Finds the nearest points of two convex shapes. `support` returns the point of the first shape
 /// furthest along a direction, and the point of the second furthest against it. `start` is the
-/// difference of any point of the first and any of the second. Ends early once the distance is known to be
-/// at most `enough` or to exceed `beyond`.
+/// difference of any point of the first and any of the second, or any way from the second to the first. Ends
+/// early once the distance is known to be at most `enough` or to exceed `beyond`.
 pub(crate) fn closest(
     support: impl Fn(&Vector) -> [Vector; 2],
     start: Vector,
     [enough, beyond]: [f64; 2],
 ) -> Closest {
-    let vertex = |towards: &Vector| {
-        let points = support(towards);
-        Vertex { points, apart: points[0] - points[1] }
-    };
     let start = if start.norm_squared() > 0.0 { start } else { Vector::x() };
-    let first = vertex(&-start);
-    let mut simplex = Simplex { vertices: [first; 4], weights: [1.0, 0.0, 0.0, 0.0], count: 1 };
+    let mut simplex = Simplex::new(support(&-start));
+    let mut v = simplex.vertices[0];
     // The plane across the start gives the first lower bound.
-    let (mut v, mut lower) = (first.apart, (start.dot(&first.apart) / start.norm()).max(0.0));
+    let mut lower = (start.dot(&v) / start.norm()).max(0.0);
     let mut size_sq = v.norm_squared();
     for _ in 0..ROUNDS {
         if lower > beyond {
@@ -72,76 +62,84 @@ pub(crate) fn closest(
         if square.is_nan() || square <= ROUNDING * ROUNDING * size_sq || square.sqrt() <= enough {
             break;
         }
-        let next = vertex(&-v);
-        let along = v.dot(&next.apart);
+        let points = support(&-v);
+        let next = points[0] - points[1];
+        let along = v.dot(&next);
         lower = lower.max(along / square.sqrt());
-        if square - along <= PRECISION * square || simplex.has(&next.apart) {
+        if square - along <= PRECISION * square || simplex.has(&next) {
             break;
         }
-        size_sq = size_sq.max(next.apart.norm_squared());
-        let mut grown = simplex;
-        grown.add(next);
-        if grown.reduce() {
-            simplex = grown;
+        size_sq = size_sq.max(next.norm_squared());
+        let Some(weights) = simplex.weights_with(next, points) else {
             v = Vector::zeros();
             break;
-        }
-        let nearer = grown.nearest();
+        };
+        let nearer = weighted(&simplex.vertices, &weights);
         if nearer.norm_squared() >= square {
             break;
         }
-        (simplex, v) = (grown, nearer);
+        simplex.keep(weights);
+        v = nearer;
     }
-    let points = [0, 1].map(|k| simplex.combined(|vertex| vertex.points[k]));
+    let points = [0, 1].map(|k| weighted(&simplex.points.map(|of| of[k]), &simplex.weights));
     let distance = v.norm();
     // Also if a support map returns what is not a number.
     let lower = (lower - 4.0 * ROUNDING * size_sq.sqrt()).max(0.0).min(distance);
     Closest { points, distance, lower }
 }
 
+/// The sum of points by weights.
+fn weighted(points: &[Vector; 4], weights: &[f64; 4]) -> Vector {
+    points[0] * weights[0] + points[1] * weights[1] + points[2] * weights[2] + points[3] * weights[3]
+}
+
 impl Simplex {
-    fn has(&self, apart: &Vector) -> bool {
-        self.vertices[..self.count].iter().any(|vertex| vertex.apart == *apart)
+    fn new(points: [Vector; 2]) -> Self {
+        let first = points[0] - points[1];
+        Self { vertices: [first; 4], points: [points; 4], weights: [1.0, 0.0, 0.0, 0.0], count: 1 }
     }
 
-    fn add(&mut self, vertex: Vertex) {
-        self.vertices[self.count] = vertex;
-        self.count += 1;
+    fn has(&self, vertex: &Vector) -> bool {
+        self.vertices[..self.count].contains(vertex)
     }
 
-    fn combined(&self, of: impl Fn(&Vertex) -> Vector) -> Vector {
-        (0..self.count).map(|i| of(&self.vertices[i]) * self.weights[i]).sum()
-    }
-
-    fn nearest(&self) -> Vector {
-        self.combined(|vertex| vertex.apart)
-    }
-
-    /// Sets the weights and drops vertices without weight. Returns `true` if a tetrahedron contains
-    /// the origin.
-    fn reduce(&mut self) -> bool {
-        let p = self.vertices.map(|vertex| vertex.apart);
-        let (weights, inside) = match self.count {
-            1 => ([1.0, 0.0, 0.0, 0.0], false),
-            2 => {
+    /// Returns the weights of all vertices and of `next`, which is nearer to the origin than all along the
+    /// way there. `None` if the tetrahedron contains the origin, for which the weights are kept.
+    fn weights_with(&mut self, next: Vector, points: [Vector; 2]) -> Option<[f64; 4]> {
+        (self.vertices[self.count], self.points[self.count]) = (next, points);
+        let p = &self.vertices;
+        Some(match self.count {
+            1 => {
                 let [a, b] = of_segment(&p[0], &p[1]);
-                ([a, b, 0.0, 0.0], false)
+                [a, b, 0.0, 0.0]
             }
-            3 => {
-                let [a, b, c] = of_triangle([&p[0], &p[1], &p[2]]);
-                ([a, b, c, 0.0], false)
+            2 => {
+                let [a, b, c] = of_triangle([&p[0], &p[1], &p[2]], &(p[1] - p[0]).cross(&(p[2] - p[0])));
+                [a, b, c, 0.0]
             }
-            _ => of_tetrahedron(&p),
-        };
-        let mut kept = 0;
-        for i in 0..self.count {
+            _ => {
+                let (weights, is_inside) = of_tetrahedron(p);
+                if is_inside {
+                    (self.weights, self.count) = (weights, 4);
+                    return None;
+                }
+                weights
+            }
+        })
+    }
+
+    /// Sets the weights and drops vertices without weight.
+    fn keep(&mut self, weights: [f64; 4]) {
+        self.weights = [0.0; 4];
+        self.count = 0;
+        for i in 0..4 {
             if weights[i] > 0.0 {
-                (self.vertices[kept], self.weights[kept]) = (self.vertices[i], weights[i]);
-                kept += 1;
+                let kept = self.count;
+                (self.vertices[kept], self.points[kept]) = (self.vertices[i], self.points[i]);
+                self.weights[kept] = weights[i];
+                self.count += 1;
             }
         }
-        self.count = kept;
-        inside
     }
 }
 
@@ -153,61 +151,44 @@ fn of_segment(a: &Vector, b: &Vector) -> [f64; 2] {
     [1.0 - share, share]
 }
 
-/// The weights of the point of a triangle nearest to the origin.
-fn of_triangle([a, b, c]: [&Vector; 3]) -> [f64; 3] {
-    let (ab, ac) = (b - a, c - a);
-    let normal = ab.cross(&ac);
-    let square = normal.norm_squared();
-    if square > 0.0 {
-        // Areas of the triangles of the foot and each edge.
-        let area = |p: &Vector, q: &Vector| p.cross(q).dot(&normal);
-        let (u, v, w) = (area(b, c), area(c, a), area(a, b));
-        if u >= 0.0 && v >= 0.0 && w >= 0.0 {
-            let sum = u + v + w;
-            if sum > 0.0 {
-                return [u / sum, v / sum, w / sum];
-            }
-        }
+/// The weights of the point of a triangle nearest to the origin, given a normal. The edge from `a` to `b` is
+/// further away than `c`.
+fn of_triangle([a, b, c]: [&Vector; 3], normal: &Vector) -> [f64; 3] {
+    // Areas of the triangles of the foot and each edge.
+    let area = |p: &Vector, q: &Vector| p.cross(q).dot(normal);
+    let (u, v, w) = (area(b, c), area(c, a), area(a, b));
+    let sum = u + v + w;
+    if u >= 0.0 && v >= 0.0 && w >= 0.0 && sum > 0.0 {
+        return [u / sum, v / sum, w / sum];
     }
-    let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
-    for [i, j] in [[0, 1], [1, 2], [2, 0]] {
-        let (p, q) = ([a, b, c][i], [a, b, c][j]);
-        let [s, t] = of_segment(p, q);
-        let square = (p * s + q * t).norm_squared();
-        if square < best.1 {
-            let mut weights = [0.0; 3];
-            (weights[i], weights[j]) = (s, t);
-            best = (weights, square);
-        }
-    }
-    best.0
+    let ([s, t], [q, r]) = (of_segment(a, c), of_segment(b, c));
+    let (by_a, by_b) = (a * s + c * t, b * q + c * r);
+    if by_b.norm_squared() < by_a.norm_squared() { [0.0, q, r] } else { [s, 0.0, t] }
 }
 
-/// The same of a tetrahedron, and `true` if it contains the origin.
+/// The same of a tetrahedron, whose first three vertices make a triangle that is further away than the last,
+/// and `true` if it contains the origin.
 fn of_tetrahedron(p: &[Vector; 4]) -> ([f64; 4], bool) {
     /// Distance of the origin from the point that the weights give, relative to the greatest vertex, up
     /// to which it counts as inside. In a flat tetrahedron rounding decides the sides.
     const OFF: f64 = 1e-9;
-    let is_outside = |[i, j, k, opposite]: [usize; 4]| {
-        let normal = (p[j] - p[i]).cross(&(p[k] - p[i]));
-        -normal.dot(&p[i]) * normal.dot(&(p[opposite] - p[i])) <= 0.0
-    };
-    let nearest = |is_wanted: &dyn Fn([usize; 4]) -> bool| {
-        let mut best = ([1.0, 0.0, 0.0, 0.0], f64::INFINITY);
-        for [i, j, k, opposite] in [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]] {
-            if is_wanted([i, j, k, opposite]) {
-                let [a, b, c] = of_triangle([&p[i], &p[j], &p[k]]);
-                let square = (p[i] * a + p[j] * b + p[k] * c).norm_squared();
+    let mut best = ([1.0, 0.0, 0.0, 0.0], f64::INFINITY);
+    let mut offer = |is_any: bool| {
+        for [i, j, opposite] in [[0, 1, 2], [0, 2, 1], [1, 2, 0]] {
+            let normal = (p[j] - p[i]).cross(&(p[3] - p[i]));
+            // The origin is not on the side of the opposite vertex.
+            if is_any || -normal.dot(&p[i]) * normal.dot(&(p[opposite] - p[i])) <= 0.0 {
+                let mut weights = [0.0; 4];
+                [weights[i], weights[j], weights[3]] = of_triangle([&p[i], &p[j], &p[3]], &normal);
+                let square = weighted(p, &weights).norm_squared();
                 if square < best.1 {
-                    let mut weights = [0.0; 4];
-                    (weights[i], weights[j], weights[k]) = (a, b, c);
                     best = (weights, square);
                 }
             }
         }
         best
     };
-    let (weights, square) = nearest(&is_outside);
+    let (weights, square) = offer(false);
     if square < f64::INFINITY {
         return (weights, false);
     }
@@ -216,7 +197,6 @@ fn of_tetrahedron(p: &[Vector; 4]) -> ([f64; 4], bool) {
     let shares = [volume(1, 2, 3), volume(0, 2, 3), volume(0, 1, 3), volume(0, 1, 2)];
     let sum: f64 = shares.iter().sum();
     let weights = shares.map(|share| share / sum);
-    let off: Vector = (0..4).map(|i| p[i] * weights[i]).sum();
     let size = p.iter().map(Vector::norm).fold(0.0, f64::max);
-    if off.norm() <= OFF * size { (weights, true) } else { (nearest(&|_| true).0, false) }
+    if weighted(p, &weights).norm() <= OFF * size { (weights, true) } else { (offer(true).0, false) }
 }

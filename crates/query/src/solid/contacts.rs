@@ -48,7 +48,6 @@ pub(crate) struct Candidates {
     found: CandidateBlocks,
     places: Vec<Met>,
     order: BinaryHeap<(u64, Candidate)>,
-    corners: Vec<[f32; 3]>,
 }
 
 /// A contact, where it is in the stored frame, and the index and the local radius of its point.
@@ -89,15 +88,14 @@ pub(crate) fn contacts(
         let own = hint.as_deref().and_then(|hint| hint.centre);
         let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
         let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
-        let Candidates { found, places, order, corners } = candidates;
+        let Candidates { found, places, order } = candidates;
         found.clear();
         places.clear();
         if !is_far(elements, solid) {
-            let mut near = Near::new(elements, solid, false);
+            let mut near = Near::new(elements, solid, false, &mut scratch.corners);
             near.limit(elements.margin);
             let starts = elements.starts(solid, elements.margin);
-            let core = solid.lane_core(corners);
-            let search = &mut Gather { near, sides: &sides, core, found: &mut *found };
+            let search = &mut Gather { near, sides: &sides, found: &mut *found };
             // The visitor never breaks.
             let _whole = near.descend(level, &starts, search);
         }
@@ -396,7 +394,7 @@ mod tests {
             let [front, behind] = all_places(&elements, &solid);
             // Leaves are searched for discs without their thickness at the rim, so others may be missed.
             let is_near = |met: &&Met| {
-                let gap = elements.gap(&solid, met.i, elements.margin).0;
+                let gap = elements.element(met.i).gap(&solid, elements.margin).0;
                 gap.distance <= solid.radius + elements.margin
             };
             let all = if front.iter().any(|met| is_near(&met)) { front } else { [front, behind].concat() };

@@ -7,6 +7,7 @@ use nearmiss_mesh::nearest_on_triangle;
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::closest::{Closest, closest};
 use crate::solid::inner::inner_depth;
+use crate::solid::plane::Plane;
 use crate::solid::shape::{Shape, SupportMap};
 
 type Vector = Vector3<f64>;
@@ -179,6 +180,12 @@ impl<'a> Solid<'a> {
         matches!(self.core, Core::Point | Core::Segment | Core::Box)
     }
 
+    /// Returns `true` if [`LaneBox`](crate::solid::lanes::LaneBox) knows the distances of the core from
+    /// points, not only bounds.
+    pub(crate) fn is_closed_in_lanes(&self) -> bool {
+        self.is_box() || self.round_ends().is_some()
+    }
+
     pub(crate) fn is_point(&self) -> bool {
         matches!(self.core, Core::Point)
     }
@@ -343,10 +350,16 @@ impl<'a> Solid<'a> {
                 Gap::of(found.on_triangle, found.on_disc)
             }
             Core::Box | Core::Round(_) => {
-                self.projected(disc).unwrap_or_else(|start| self.iterated(disc, start, [0.0, beyond]))
+                self.projected(disc, beyond).unwrap_or_else(|start| self.iterated(disc, start, [0.0, beyond]))
             }
             Core::Hull(..) | Core::Own(..) => self.iterated(disc, self.inside - disc.centre, [0.0, beyond]),
         }
+    }
+
+    /// The plane through the point of the core that is furthest against `way`. `None` if that has no length.
+    pub(crate) fn plane_across(&self, way: &Vector) -> Option<Plane> {
+        let normal = way.try_normalize(0.0)?;
+        Some(Plane::through(&self.support(&-normal), normal))
     }
 
     /// Two points of the core and a disc that are at most `within` apart, if there are any; otherwise any
@@ -378,9 +391,9 @@ impl<'a> Solid<'a> {
         Closest { points: points.map(|p| p + origin), distance, lower }
     }
 
-    /// The nearest points of the core and a disc, if each is soon the point nearest to the other.
-    /// Otherwise the difference of the last two.
-    fn projected(&self, disc: &FlatDisc) -> Result<Gap, Vector> {
+    /// The nearest points of the core and a disc, if each is soon the point nearest to the other; any two if
+    /// their distance exceeds `beyond`. Otherwise the difference of the last two.
+    fn projected(&self, disc: &FlatDisc, beyond: f64) -> Result<Gap, Vector> {
         const ROUNDS: u32 = 3;
         /// In disc radii.
         const SAME: f64 = 1e-10;
@@ -390,12 +403,12 @@ impl<'a> Solid<'a> {
             let next = self.nearest(&on_disc);
             let is_same = (next - on_core).norm_squared() <= (SAME * disc.radius).powi(2);
             on_core = next;
-            if is_same {
-                let way = on_core - on_disc;
-                let distance = way.norm();
-                // From the plane across the way between them.
-                let apart = self.support(&-way) - disc.centre - disc.rim(&way);
-                let lower = if distance > 0.0 { way.dot(&apart) / distance } else { 0.0 };
+            let way = on_core - on_disc;
+            let distance = way.norm();
+            // From the plane across the way between them.
+            let apart = self.support(&-way) - disc.centre - disc.rim(&way);
+            let lower = if distance > 0.0 { way.dot(&apart) / distance } else { 0.0 };
+            if is_same || lower > beyond {
                 return Ok(Gap { distance, lower: lower.clamp(0.0, distance), on_core, on_disc });
             }
         }

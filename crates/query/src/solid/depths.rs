@@ -13,13 +13,10 @@ use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::wide::{Vectors, along, product, squared};
 
 use crate::solid::core::LaneCore;
-use crate::solid::lanes::LaneBox;
+use crate::solid::lanes::{LEVEL, LaneBox};
 
 /// The cosine below which the plane of a face is too steep to bound the depth over a disc across it.
 const STEEP: f32 = 0.1;
-
-/// The error of the square of a slope.
-const LEVEL: f32 = 1e-4;
 
 /// The discs of sixteen points, relative to the centre of a shape's box.
 #[derive(Clone, Copy)]
@@ -32,39 +29,11 @@ pub(crate) struct LaneDiscs<S: Simd> {
     pub(crate) slack: f32x16<S>,
 }
 
-impl LaneCore<'_> {
-    /// Upper bounds on how far the core extends from the centre of its box along unit vectors, up to
-    /// rounding.
-    #[inline(always)]
-    fn extents<S: Simd>(&self, simd: S, ways: Vectors<S>) -> f32x16<S> {
-        match *self {
-            Self::Box => f32x16::splat(simd, f32::INFINITY),
-            Self::Round { axis, half, radii } => {
-                let rise = along(ways, axis);
-                let slope = ((1.0 - rise * rise).max(0.0) + LEVEL).sqrt();
-                (slope * radii[0] - rise * half).max(slope * radii[1] + rise * half)
-            }
-            Self::Corners(corners) => {
-                let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
-                for &corner in corners {
-                    most = most.max(along(ways, corner));
-                }
-                most
-            }
-        }
-    }
-}
-
-impl LaneBox {
+impl LaneBox<'_> {
     /// Upper bounds on the depths of a shape with this box and this radius over discs. Negative infinity
     /// where no part of the shape is over the disc. O(1), or O(n) for a hull of n corners.
     #[inline(always)]
-    pub(crate) fn depths<S: Simd>(
-        &self,
-        simd: S,
-        discs: &LaneDiscs<S>,
-        (core, radius): (LaneCore<'_>, f32),
-    ) -> f32x16<S> {
+    pub(crate) fn depths<S: Simd>(&self, simd: S, discs: &LaneDiscs<S>, radius: f32) -> f32x16<S> {
         if !self.is_near {
             return f32x16::splat(simd, f32::INFINITY);
         }
@@ -79,13 +48,13 @@ impl LaneBox {
         let height = product(discs.centres, discs.out);
         if self.is_segment {
             self.over_segment(simd, discs, (rises[0], reach, height), radius)
-        } else if let LaneCore::Box = core {
+        } else if let LaneCore::Box = self.core {
             self.over_box(simd, discs, (rises, reach, height), radius)
         } else {
             let [x, y, z] = discs.out;
-            let reach = reach.min(core.extents(simd, [-x, -y, -z]));
+            let reach = reach.min(self.core.extents(simd, [-x, -y, -z]));
             let most = self.over_box(simd, discs, (rises, reach, height), radius);
-            is_beside(simd, discs, height, (core, radius))
+            is_beside(simd, discs, height, (self.core, radius))
                 .select(f32x16::splat(simd, f32::NEG_INFINITY), most)
         }
     }
@@ -250,9 +219,8 @@ mod tests {
                 _ => Shape::Cylinder { pose, half_height: 3.0, radius: 0.01, rounding: 0.0 },
             };
             let solid = Solid::new(&shape, &Pose::IDENTITY).unwrap();
-            let lane_box = LaneBox::new(&solid, 2.0);
             let mut corners = Vec::new();
-            let core = solid.lane_core(&mut corners);
+            let lane_box = LaneBox::new(&solid, 2.0, solid.lane_core(&mut corners));
             let discs: [(Vector, Vector, f64); 16] = [(); 16].map(|()| {
                 let mut out = Vector::from(unit_vector(rng));
                 let mut size = 0.5;
@@ -277,7 +245,7 @@ mod tests {
                     let slack = f32x16::splat(simd, 2e-4);
                     let discs = LaneDiscs { centres, out, radii: each(&|disc| disc.2), slack };
                     #[expect(clippy::cast_possible_truncation, reason = "single precision")]
-                    lane_box.depths(simd, &discs, (core, solid.radius as f32)).to_array()
+                    lane_box.depths(simd, &discs, solid.radius as f32).to_array()
                 });
                 for (&(centre, out, radius), bound) in discs.iter().zip(found) {
                     left_out[kind] += usize::from(bound == f32::NEG_INFINITY);

@@ -15,7 +15,7 @@ use crate::solid::lanes::LaneBox;
 pub(crate) struct Near<'s, 'a> {
     pub(crate) elements: &'s Elements<'a>,
     pub(crate) solid: &'s Solid<'s>,
-    pub(crate) lane_box: LaneBox,
+    pub(crate) lane_box: LaneBox<'s>,
     /// `true` if nodes are pruned by their enclosures, `false` if by their boxes.
     grown: bool,
     /// The distance from the core beyond which nothing is of interest, and its square.
@@ -26,8 +26,14 @@ pub(crate) struct Near<'s, 'a> {
 }
 
 impl<'s, 'a> Near<'s, 'a> {
-    pub(crate) fn new(elements: &'s Elements<'a>, solid: &'s Solid<'s>, grown: bool) -> Self {
-        let lane_box = LaneBox::new(solid, elements.far);
+    /// `corners` is memory for those of the shape.
+    pub(crate) fn new(
+        elements: &'s Elements<'a>,
+        solid: &'s Solid<'s>,
+        grown: bool,
+        corners: &'s mut Vec<[f32; 3]>,
+    ) -> Self {
+        let lane_box = LaneBox::new(solid, elements.far, solid.lane_core(corners));
         let (most, most_sq) = (f32::INFINITY, f32::INFINITY);
         Self { elements, solid, lane_box, grown, most, most_sq, node_sq: 0.0 }
     }

@@ -12,7 +12,8 @@ use crate::ask::options::Semantics;
 use crate::solid::answer::ShapeDistance;
 use crate::solid::core::{Gap, Solid};
 use crate::solid::descent::Near;
-use crate::solid::elements::Elements;
+use crate::solid::elements::{Element, Elements};
+use crate::solid::plane::Plane;
 
 /// The search for the nearest disc or ball, nearest node first.
 struct Apart<'s, 'a> {
@@ -22,24 +23,26 @@ struct Apart<'s, 'a> {
     /// The least distance of the shape so far, and its point.
     upper: f64,
     best: Option<(usize, Gap)>,
+    /// The plane between the core and the nearest part.
+    plane: Option<Plane>,
     /// The least lower bound of any point that was compared.
     lower: f64,
 }
 
 /// Bounds the distance of `solid` and the scan, up to `within` in the world. `None` if it is further
-/// away, or invalid.
+/// away, or invalid. `corners` is memory for those of the shape.
 pub(crate) fn distance(
     elements: &Elements<'_>,
     solid: Option<&Solid<'_>>,
     within: f64,
-    level: Level,
+    (level, corners): (Level, &mut Vec<[f32; 3]>),
 ) -> Option<ShapeDistance> {
     let solid = solid?;
     let scale = elements.scale();
     // Enclosures, because the nearest place of the obstacle may be outside the boxes.
-    let near = Near::new(elements, solid, elements.certifies);
+    let near = Near::new(elements, solid, elements.certifies, corners);
     let (most, none) = (within / scale, f64::INFINITY);
-    let mut search = Apart { near, within: most, upper: none, best: None, lower: none };
+    let mut search = Apart { near, within: most, upper: none, best: None, plane: None, lower: none };
     search.near.limit(most);
     // Ends early if they touch.
     if search.near_centre(level).is_continue() {
@@ -90,11 +93,18 @@ impl Apart<'_, '_> {
         if elements.is_doubtful(i) {
             return ControlFlow::Continue(());
         }
-        let (gap, thick) = elements.gap(solid, i, self.upper);
+        let element = elements.element(i);
+        if let (Some(plane), Element::Disc(disc)) = (&self.plane, &element)
+            && plane.above(disc) > solid.radius + self.upper.max(disc.thickness())
+        {
+            return ControlFlow::Continue(());
+        }
+        let (gap, thick) = element.gap(solid, self.upper);
         let distance = gap.distance - solid.radius;
         let distance = if distance <= thick { 0.0 } else { distance };
         if distance < self.upper {
             (self.upper, self.best) = (distance, Some((i, gap)));
+            self.plane = solid.plane_across(&(gap.on_core - gap.on_disc));
             self.near.limit(distance.min(self.within));
         }
         if self.upper == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -103,10 +113,11 @@ impl Apart<'_, '_> {
     /// Updates the lower bound by the obstacle near a point.
     fn bound(&mut self, i: usize, by_lanes: f64) {
         let Near { elements, solid, .. } = self.near;
-        let own = if solid.is_box() && by_lanes > 0.0 {
+        let own = if solid.is_closed_in_lanes() && by_lanes > 0.0 {
             by_lanes
         } else {
-            by_lanes.max(elements.cell_gap(solid, i) - solid.radius)
+            let most = self.lower.min(self.upper) + solid.radius;
+            by_lanes.max(elements.cell_gap(solid, i, (most, self.plane.as_ref())) - solid.radius)
         };
         self.lower = self.lower.min(own);
     }

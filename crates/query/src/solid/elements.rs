@@ -17,6 +17,7 @@ use crate::pair::placed::Placed;
 use crate::solid::core::{Gap, Solid};
 use crate::solid::lanes::{Distances, LaneBox};
 use crate::solid::plan::ShapePlan;
+use crate::solid::plane::Plane;
 
 type Vector = Vector3<f64>;
 
@@ -32,6 +33,27 @@ pub(crate) enum Element {
     Disc(FlatDisc),
     /// A ball about the point.
     Ball(Vector, f64),
+}
+
+impl Element {
+    /// The nearest points of a core and the disc or ball. Also the distance up to which they meet without a
+    /// margin. If the shape is further away than `most` and than that, any distance that exceeds both.
+    pub(crate) fn gap(&self, solid: &Solid<'_>, most: f64) -> (Gap, f64) {
+        match self {
+            Self::Disc(disc) => {
+                let thick = disc.thickness();
+                (solid.gap(disc, solid.radius + most.max(thick)), thick)
+            }
+            &Self::Ball(centre, radius) => {
+                let on_core = solid.nearest(&centre);
+                let away = on_core - centre;
+                let length = away.norm();
+                let on_ball = if length > radius { centre + away * (radius / length) } else { on_core };
+                let distance = length - radius;
+                (Gap { distance, lower: distance - 1e-12 * length, on_core, on_disc: on_ball }, 0.0)
+            }
+        }
+    }
 }
 
 /// A scan with the meaning of a plan, in its stored frame.
@@ -94,7 +116,7 @@ pub(crate) struct Measured<S: Simd> {
 
 impl<S: Simd> Measured<S> {
     #[inline(always)]
-    pub(crate) fn new(simd: S, lane_box: &LaneBox, block: &LeafBlock) -> Self {
+    pub(crate) fn new(simd: S, lane_box: &LaneBox<'_>, block: &LeafBlock) -> Self {
         // Positions are off by a step, and normals by less than a step in each component.
         let [x, y, z] = block.half;
         let step = 2.0 * (x * x + y * y + z * z).sqrt() / STEPS;
@@ -265,40 +287,29 @@ impl<'a> Elements<'a> {
 
     /// A point of the disc or ball of a point that is in a shape or within the margin, if there is one.
     pub(crate) fn reached(&self, solid: &Solid<'_>, i: usize) -> Option<Vector> {
-        let Element::Disc(disc) = self.element(i) else {
-            let (gap, _) = self.gap(solid, i, self.margin);
+        let element = self.element(i);
+        let Element::Disc(disc) = element else {
+            let (gap, _) = element.gap(solid, self.margin);
             return if gap.distance > solid.radius + self.margin { None } else { Some(gap.on_disc) };
         };
-        let thick = f64::from(THICKNESS) * disc.radius;
-        solid.reaches(&disc, solid.radius + self.margin.max(thick))
+        solid.reaches(&disc, solid.radius + self.margin.max(disc.thickness()))
     }
 
-    /// The nearest points of a core and the part of a point, less its ball. Also the distance up to
-    /// which they meet without a margin. If the shape is further away than `most` and than that, any
-    /// distance that exceeds both.
-    pub(crate) fn gap(&self, solid: &Solid<'_>, i: usize, most: f64) -> (Gap, f64) {
-        match self.element(i) {
-            Element::Disc(disc) => {
-                let thick = f64::from(THICKNESS) * disc.radius;
-                (solid.gap(&disc, solid.radius + most.max(thick)), thick)
-            }
-            Element::Ball(centre, radius) => {
-                let on_core = solid.nearest(&centre);
-                let away = on_core - centre;
-                let length = away.norm();
-                let on_ball = if length > radius { centre + away * (radius / length) } else { on_core };
-                let distance = length - radius;
-                (Gap { distance, lower: distance - 1e-12 * length, on_core, on_disc: on_ball }, 0.0)
-            }
-        }
-    }
-
-    /// A lower bound on the distance of a core from the obstacle near a point.
-    pub(crate) fn cell_gap(&self, solid: &Solid<'_>, i: usize) -> f64 {
+    /// A lower bound on the distance of a core from the obstacle near a point; any that exceeds `beyond` if
+    /// the distance does. The core is above `plane`.
+    pub(crate) fn cell_gap(
+        &self,
+        solid: &Solid<'_>,
+        i: usize,
+        (beyond, plane): (f64, Option<&Plane>),
+    ) -> f64 {
         let (centre, reach) = (self.position(i), f64::from(self.arrays.obstacle_reach(i)));
-        let by_ball = solid.distance(&centre) * (1.0 - 1e-9) - reach;
-        let Some((disc, slab)) = self.cell(i, centre, reach) else { return by_ball };
-        by_ball.max(solid.gap(&disc, f64::INFINITY).lower - slab)
+        let Some((disc, slab)) = self.cell(i, centre, reach) else {
+            return solid.distance(&centre) * (1.0 - 1e-9) - reach;
+        };
+        let above = plane.map_or(0.0, |plane| plane.above(&disc));
+        let lower = if above > beyond + slab { above } else { solid.gap(&disc, beyond + slab).lower };
+        lower - slab
     }
 
     /// Returns `true` if the obstacle near a point is proven to be further than `within` from a core.
@@ -325,7 +336,7 @@ impl<'a> Elements<'a> {
     pub(crate) fn leaf_gaps<S: Simd>(
         &self,
         simd: S,
-        lane_box: &LaneBox,
+        lane_box: &LaneBox<'_>,
         (leaf, block, first, count): (usize, &LeafBlock, usize, usize),
     ) -> LeafGaps {
         let has_cells = self.certifies && self.semantics == Semantics::Obstacle;

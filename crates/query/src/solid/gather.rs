@@ -10,7 +10,6 @@ use nearmiss_lanes::wide::{Bits, along, bits, product};
 
 use crate::ask::options::Semantics;
 use crate::solid::candidates::{CandidateBlock, CandidateBlocks, CandidateLanes};
-use crate::solid::core::LaneCore;
 use crate::solid::depths::LaneDiscs;
 use crate::solid::descent::Near;
 use crate::solid::elements::{Element, Elements, Measured};
@@ -26,7 +25,6 @@ const NORMAL: f32 = 1e-4;
 pub(crate) struct Gather<'s, 'a> {
     pub(crate) near: Near<'s, 'a>,
     pub(crate) sides: &'s Sides,
-    pub(crate) core: LaneCore<'s>,
     pub(crate) found: &'s mut CandidateBlocks,
 }
 
@@ -96,7 +94,7 @@ impl Gather<'_, '_> {
         let [x, y, z] = normals;
         let out = [is_turned.select(-x, x), is_turned.select(-y, y), is_turned.select(-z, z)];
         let of_discs = LaneDiscs { centres: d, out, radii: parts.radii, slack: tilt };
-        let of_discs = lane_box.depths(simd, &of_discs, (self.core, radius));
+        let of_discs = lane_box.depths(simd, &of_discs, radius);
         let is_in: mask32x16<S> = distances.from_point.simd_le(tilt);
         let of_balls = is_in.select(none, parts.radii + radius - distances.from_point + tilt);
         let depths = parts.discs.select(of_discs, of_balls);

@@ -9,7 +9,7 @@ use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
 use nearmiss_hierarchy::NodeBounds;
 use nearmiss_lanes::wide::{Vectors, along, product, squared};
 
-use crate::solid::core::Solid;
+use crate::solid::core::{LaneCore, Solid};
 
 /// Rounding of distances, relative to all coordinates: as that of boxes in a relative pose.
 const ROUNDING: f64 = 8e-6;
@@ -20,9 +20,39 @@ const FARTHEST: f64 = 1e15;
 /// An upper bound on the error of the square of a sine, as normals in steps are not of unit length.
 const SINE_SQ: f32 = 5e-4;
 
-/// The box about the core of a shape, in single precision.
+/// Steps towards the nearest point of a hull.
+const STEPS: u32 = 4;
+
+/// The error of the square of a slope.
+pub(crate) const LEVEL: f32 = 1e-4;
+
+impl LaneCore<'_> {
+    /// Upper bounds on how far the core extends from the centre of its box along unit vectors, up to
+    /// rounding.
+    #[inline(always)]
+    pub(crate) fn extents<S: Simd>(&self, simd: S, ways: Vectors<S>) -> f32x16<S> {
+        match *self {
+            Self::Box => f32x16::splat(simd, f32::INFINITY),
+            Self::Round { axis, half, radii } => {
+                let rise = along(ways, axis);
+                let slope = ((1.0 - rise * rise).max(0.0) + LEVEL).sqrt();
+                (slope * radii[0] - rise * half).max(slope * radii[1] + rise * half)
+            }
+            Self::Corners(corners) => {
+                let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
+                for &corner in corners {
+                    most = most.max(along(ways, corner));
+                }
+                most
+            }
+        }
+    }
+}
+
+/// The box about the core of a shape, and what is known of the core itself, in single precision.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LaneBox {
+pub(crate) struct LaneBox<'c> {
+    pub(crate) core: LaneCore<'c>,
     pub(crate) centre: [f32; 3],
     pub(crate) axes: [[f32; 3]; 3],
     pub(crate) half: [f32; 3],
@@ -35,13 +65,14 @@ pub(crate) struct LaneBox {
     pub(crate) slack: f32,
 }
 
-impl LaneBox {
-    /// The box of a shape near a scan whose coordinates are at most `far`.
+impl<'c> LaneBox<'c> {
+    /// The box of a shape near a scan whose coordinates are at most `far`, and its core.
     #[expect(clippy::cast_possible_truncation, reason = "counted in `slack`")]
-    pub(crate) fn new(solid: &Solid<'_>, far: f64) -> Self {
+    pub(crate) fn new(solid: &Solid<'_>, far: f64, core: LaneCore<'c>) -> Self {
         let far = far + solid.centre.amax() + solid.half.sum() + solid.radius;
         let single = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32];
         Self {
+            core,
             centre: single(solid.centre.into()),
             axes: solid.axes.map(|axis| single(axis.into())),
             half: single(solid.half.into()),
@@ -119,7 +150,8 @@ impl LaneBox {
         }
         let [cx, cy, cz] = self.centre;
         let d = [points[0] - cx, points[1] - cy, points[2] - cz];
-        let height = product(d, *normals).abs();
+        let signed = product(d, *normals);
+        let height = signed.abs();
         if self.is_point {
             let square = squared(d);
             let beside = (square - height * height).max(0.0).sqrt();
@@ -127,18 +159,123 @@ impl LaneBox {
             return Distances { from_point: square.sqrt(), from_plane: height, beside, sine };
         }
         let (mut sum, mut reach, mut rise) = (zero, zero, zero);
+        let mut way = [zero; 3];
         for j in 0..3 {
             let axis = self.axes[j];
             let (at, slope) = (along(d, axis), along(*normals, axis));
             let beyond = (at.abs() - self.half[j]).max(0.0);
             sum += beyond * beyond;
             reach += slope.abs() * self.half[j];
-            rise += beyond.copysign(at) * slope;
+            let beyond = beyond.copysign(at);
+            rise += beyond * slope;
+            if let LaneCore::Corners(_) = self.core {
+                way = [way[0] + beyond * axis[0], way[1] + beyond * axis[1], way[2] + beyond * axis[2]];
+            }
         }
+        let mut from_point = sum.sqrt();
+        if let LaneCore::Round { axis, half, radii } = self.core {
+            (sum, rise) = of_round(simd, (&d, normals), (axis, half, radii));
+            from_point = sum.sqrt();
+        }
+        if let LaneCore::Corners(corners) = self.core {
+            // From the box to the point or, within the box, from its centre.
+            let is_within: mask32x16<S> = sum.simd_le(0.0);
+            for k in 0..3 {
+                way[k] = is_within.select(d[k], way[k]);
+            }
+            let (apart, way) = of_corners(simd, &d, way, corners);
+            (sum, rise) = (f32x16::splat(simd, 1.0), product(way, *normals));
+            from_point = from_point.max(apart);
+        }
+        let from_plane = if let LaneCore::Box = self.core {
+            height - reach
+        } else {
+            let sign = f32x16::splat(simd, 1.0).copysign(signed);
+            let [x, y, z] = *normals;
+            height - self.core.extents(simd, [x * sign, y * sign, z * sign]).min(reach)
+        };
         let sine_sq = (sum - rise * rise).max(0.0) / sum.max(f32::MIN_POSITIVE) + SINE_SQ;
-        let from_plane = (height - reach).max(0.0);
-        Distances { from_point: sum.sqrt(), from_plane, beside: zero, sine: sine_sq.sqrt().min(1.0) }
+        let from_plane = from_plane.max(0.0);
+        Distances { from_point, from_plane, beside: zero, sine: sine_sq.sqrt().min(1.0) }
     }
+}
+
+/// Lower bounds on the distances of a hull of corners from points, all relative to the same place, and the
+/// unit normals of the planes between them.
+///
+/// `way` leads from the hull to each point, roughly. Steps of Frank & Wolfe ("An algorithm for quadratic
+/// programming", Naval Research Logistics Quarterly 3, 1956) move a point of the hull towards the nearest.
+#[inline(always)]
+fn of_corners<S: Simd>(
+    simd: S,
+    d: &Vectors<S>,
+    mut way: Vectors<S>,
+    corners: &[[f32; 3]],
+) -> (f32x16<S>, Vectors<S>) {
+    let zero = f32x16::splat(simd, 0.0);
+    let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
+    let mut best = way;
+    for round in 0..STEPS {
+        let mut reach = f32x16::splat(simd, f32::NEG_INFINITY);
+        let mut furthest = [zero; 3];
+        for &corner in corners {
+            let own = along(way, corner);
+            let is_further: mask32x16<S> = own.simd_gt(reach);
+            reach = own.max(reach);
+            for k in 0..3 {
+                furthest[k] = is_further.select(f32x16::splat(simd, corner[k]), furthest[k]);
+            }
+        }
+        let square = squared(way);
+        let per_unit = 1.0 / square.sqrt().max(f32::MIN_POSITIVE);
+        let apart = (product(way, *d) - reach) * per_unit;
+        let is_more: mask32x16<S> = apart.simd_gt(most);
+        most = apart.max(most);
+        // From the corner to the point, and from there to the way.
+        let next = [d[0] - furthest[0], d[1] - furthest[1], d[2] - furthest[2]];
+        let change = [way[0] - next[0], way[1] - next[1], way[2] - next[2]];
+        let share = product(way, change) / squared(change).max(f32::MIN_POSITIVE);
+        let share = if round == 0 { f32x16::splat(simd, 1.0) } else { share.max(zero).min(1.0) };
+        for k in 0..3 {
+            best[k] = is_more.select(way[k] * per_unit, best[k]);
+            way[k] -= share * change[k];
+        }
+    }
+    (most, best)
+}
+
+/// The squared distances of a truncated cone, given by its axis, half its height and the radii below and
+/// above, from points relative to its centre; and the ways to them along the normals.
+#[inline(always)]
+fn of_round<S: Simd>(
+    simd: S,
+    (d, normals): (&Vectors<S>, &Vectors<S>),
+    (axis, half, [below, above]): ([f32; 3], f32, [f32; 2]),
+) -> (f32x16<S>, f32x16<S>) {
+    let zero = f32x16::splat(simd, 0.0);
+    let at = along(*d, axis);
+    let [x, y, z] = *d;
+    let across = [x - at * axis[0], y - at * axis[1], z - at * axis[2]];
+    let beside = squared(across).sqrt();
+    // To the slanted side, and to both lids.
+    let (low, high) = (at + half, at - half);
+    let side = [above - below, 2.0 * half];
+    let square = (side[0] * side[0] + side[1] * side[1]).max(f32::MIN_POSITIVE);
+    let share = (((beside - below) * side[0] + low * side[1]) * (1.0 / square)).max(0.0).min(1.0);
+    let mut out = beside - below - share * side[0];
+    let mut up = low - share * side[1];
+    let mut least = out * out + up * up;
+    for (radius, up_lid) in [(below, low), (above, high)] {
+        let out_lid = (beside - radius).max(0.0);
+        let own = out_lid * out_lid + up_lid * up_lid;
+        let is_less: mask32x16<S> = own.simd_lt(least);
+        (out, up) = (is_less.select(out_lid, out), is_less.select(up_lid, up));
+        least = own.min(least);
+    }
+    let beyond_side = (beside - below) * side[1] - low * side[0];
+    let is_in: mask32x16<S> = beyond_side.max(-low).max(high).simd_le(0.0);
+    let rise = out * product(across, *normals) / beside.max(f32::MIN_POSITIVE) + up * along(*normals, axis);
+    (is_in.select(zero, least), is_in.select(zero, rise))
 }
 
 /// Distances of a core from points and the planes through them.
@@ -190,5 +327,89 @@ impl<S: Simd> Distances<S> {
     #[inline(always)]
     fn across(&self, radii: f32x16<S>) -> f32x16<S> {
         self.from_point - radii * self.sine
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::dispatch;
+    use nearmiss_geometry::Pose;
+    use nearmiss_geometry::nalgebra::Vector3;
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
+    use nearmiss_testdata::instructions::levels;
+    use rand::RngExt;
+
+    use super::*;
+    use crate::leaf::disc_triangle::FlatDisc;
+    use crate::solid::shape::Shape;
+
+    type Vector = Vector3<f64>;
+
+    /// Bounds never exceed the distances of points and discs, and those of closed cores are the distances.
+    #[test]
+    fn distances_of_cores_are_bounded_closely_by_any_instructions() {
+        const KINDS: usize = 6;
+        /// The error of a bound in single precision.
+        const ERROR: f64 = 1e-5;
+        let rng = &mut rng(11);
+        let (mut apart, mut of_points, mut of_discs) = ([0_u32; KINDS], [0.0; KINDS], [0.0; KINDS]);
+        for round in 0..300 {
+            let kind = round % KINDS;
+            let pose = rotation(rng).with_translation(point_in(rng, 1.0));
+            let points: Vec<[f64; 3]> = (0..7).map(|_| pose.apply(point_in(rng, 0.5))).collect();
+            let half: [f64; 3] = [0, 1, 2].map(|_| rng.random_range(0.0..0.6));
+            let shape = match kind {
+                0 => Shape::Capsule { ends: [points[0], points[1]], radius: 0.0 },
+                1 => Shape::Box { pose, half, radius: 0.0 },
+                2 => Shape::Cylinder { pose, half_height: half[0], radius: half[1], rounding: 0.0 },
+                3 => Shape::Cone { pose, half_height: half[0], radius: half[1], rounding: 0.0 },
+                4 => Shape::Triangle { points: [points[0], points[1], points[2]], radius: 0.0 },
+                _ => Shape::Hull { points: &points, radius: 0.0 },
+            };
+            let solid = Solid::new(&shape, &Pose::IDENTITY).unwrap();
+            let mut corners = Vec::new();
+            let lane_box = LaneBox::new(&solid, 2.0, solid.lane_core(&mut corners));
+            // On and in the axis of a cone as well.
+            let discs: [FlatDisc; 16] = [(); 16].map(|()| {
+                let off = Vector::from(point_in(rng, 1.5)) * f64::from(rng.random_range(0..3_u8)) * 0.5;
+                let along =
+                    solid.axes[1] * rng.random_range(-1.0..1.0) * f64::from(rng.random_range(0..2_u8));
+                let normal = Vector::from(unit_vector(rng));
+                FlatDisc { centre: solid.centre + off + along, normal, radius: rng.random_range(0.0..0.4) }
+            });
+            for level in levels() {
+                let [from_points, from_discs] = dispatch!(level, simd => {
+                    let each = |of: &dyn Fn(&FlatDisc) -> f64| {
+                        #[expect(clippy::cast_possible_truncation, reason = "single precision")]
+                        f32x16::load_array(simd, discs.each_ref().map(|disc| of(disc) as f32))
+                    };
+                    let centres = [0, 1, 2].map(|k| each(&|disc| disc.centre[k]));
+                    let normals = [0, 1, 2].map(|k| each(&|disc| disc.normal[k]));
+                    let found = lane_box.of_points(simd, &centres, &normals);
+                    let (radii, none) = (each(&|disc| disc.radius), f32x16::splat(simd, 0.0));
+                    let all = mask32x16::from_bitmask(simd, 0xffff);
+                    [found.from_point.to_array(), found.parts(simd, radii, none, all).to_array()]
+                });
+                for (lane, disc) in discs.iter().enumerate() {
+                    let distance = solid.distance(&disc.centre);
+                    let gap = solid.gap(disc, f64::INFINITY).distance;
+                    let [by_point, by_disc] = [from_points, from_discs].map(|of| f64::from(of[lane]));
+                    let what = || format!("{shape:?} {disc:?}");
+                    assert!(by_point <= distance + ERROR, "{by_point}, {distance} away: {}", what());
+                    assert!(by_disc <= gap + ERROR, "{by_disc}, {gap} away: {}", what());
+                    if kind < 4 {
+                        assert!(by_point >= distance - ERROR, "{by_point}, {distance} away: {}", what());
+                    }
+                    apart[kind] += u32::from(gap > 0.0);
+                    of_points[kind] += distance - by_point;
+                    of_discs[kind] += (gap - by_disc.max(0.0)) / disc.radius.max(0.1);
+                }
+            }
+        }
+        let mean = |sums: [f64; KINDS]| [0, 1, 2, 3, 4, 5].map(|kind| sums[kind] / f64::from(apart[kind]));
+        let (of_points, of_discs) = (mean(of_points), mean(of_discs));
+        assert!(of_points[4] < 0.05 && of_points[5] < 0.15, "{of_points:?} short of distances");
+        assert!(of_discs.iter().all(|&mean| mean < 0.2), "{of_discs:?} disc radii short of distances");
+        assert!(apart.iter().all(|&count| count > 500), "{apart:?} apart");
     }
 }

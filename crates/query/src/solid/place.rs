@@ -1,7 +1,7 @@
 //! The contact of a shape with one disc or ball, in the stored frame.
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{PointKind, THICKNESS};
+use nearmiss_hierarchy::PointKind;
 
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::{Gap, Solid};
@@ -45,7 +45,7 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
         Element::Disc(disc) => disc,
     };
     let out = disc.normal * sign;
-    let most = solid.radius + elements.margin.max(f64::from(THICKNESS) * disc.radius);
+    let most = solid.radius + elements.margin.max(disc.thickness());
     let place = if elements.placed.scan().kind(i) == PointKind::Edge {
         at_border(solid, &disc, out, most)
     } else {
@@ -125,7 +125,7 @@ pub(crate) fn place_beside(elements: &Elements<'_>, solid: &Solid<'_>, i: usize,
 
 /// The nearest points of a core and the part of a point, if these are within the margin.
 fn near_gap(elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> Option<Gap> {
-    let (gap, thick) = elements.gap(solid, i, elements.margin);
+    let (gap, thick) = elements.element(i).gap(solid, elements.margin);
     (gap.distance <= solid.radius + elements.margin.max(thick)).then_some(gap)
 }
 

@@ -120,7 +120,7 @@ fn search(
     at: Option<(&ClearanceGrid, Clearance<'_>)>,
     (level, scratch): (Level, &mut ViewScratch),
 ) -> ShapeAnswer {
-    let mut near = Near::new(elements, solid, elements.certifies);
+    let mut near = Near::new(elements, solid, elements.certifies, &mut scratch.corners);
     near.limit(elements.margin);
     let mut search = Touch { near, found: Findings::NONE };
     // An early end means that the question is settled.
@@ -140,7 +140,7 @@ impl Findings {
 
     /// Compares the shape with the part of a point, and with the point itself.
     fn examine(&mut self, elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> ControlFlow<()> {
-        if solid.is_box() {
+        if solid.has_projection() {
             self.hold(elements, solid, i)?;
         }
         self.compare(elements, solid, i)
@@ -232,7 +232,7 @@ impl PlaceVisitor for Touch<'_, '_> {
         }
         for (block, first, count) in elements.arrays.leaves.blocks(number) {
             let gaps = elements.leaf_gaps(simd, lane_box, (number, block, first, count));
-            if solid.is_box() {
+            if solid.has_projection() {
                 let first_in = Bits(Elements::within(simd, (&gaps.points, count), most)).next();
                 first_in
                     .map_or(ControlFlow::Continue(()), |lane| found.hold(elements, solid, first + lane))?;
