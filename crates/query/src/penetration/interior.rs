@@ -168,7 +168,7 @@ pub(crate) fn nearest_part(elements: &Elements<'_>, place: &Vector, level: Level
 fn foot(elements: &Elements<'_>, place: &Vector, level: Level) -> Option<(f64, Vector)> {
     // A point has no corners.
     let working = (level, &mut Vec::new());
-    let found = distance(elements, Some(&Solid::point(*place)), f64::INFINITY, working)?;
+    let found = distance(&elements.flat(), Some(&Solid::point(*place)), f64::INFINITY, working)?;
     let foot = elements.placed.stored_to_world().apply_inverse(found.points[0]);
     Some((found.lower / elements.scale(), foot.into()))
 }

@@ -8,8 +8,8 @@ use crate::penetration::survey::ContactSurvey;
 
 pub(crate) type Vector = Vector3<f64>;
 
-/// Distances from scans are bounded to this, in sampling radii: half the thickness of the volume that
-/// contains the surface, and more.
+/// The search ends once the bounds for a scan differ by this, in sampling radii. The upper one is further
+/// from the exact penetration: discs reach beyond edges.
 pub(crate) const SLACK: f64 = 0.4;
 
 /// Where a place that two things have in common is in each of them.
@@ -98,7 +98,7 @@ pub(crate) trait Probe {
     /// The axes of boxes about both things.
     fn axes(&self) -> [[Vector; 3]; 2];
 
-    /// A length by which bounds are known to differ.
+    /// A length by which the bounds may differ.
     fn slack(&self) -> f64;
 
     /// A bound of the rounding error of lengths.

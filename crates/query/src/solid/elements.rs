@@ -78,6 +78,8 @@ pub(crate) struct Elements<'a> {
     pub(crate) far: f64,
     /// `true` if enclosures prove separations.
     pub(crate) certifies: bool,
+    /// Half the thickness of cells, in local radii.
+    slab: f32,
 }
 
 /// Lower bounds on the distances of a core from the parts of sixteen points; infinite in unused lanes.
@@ -156,12 +158,19 @@ impl<'a> Elements<'a> {
             thickened,
             far: f64::from(far) + thickened,
             certifies: options.certifies(),
+            slab: SLAB,
         }
     }
 
     /// The same, with which nothing evaluates the implicit function.
     pub(crate) fn without_witness(&self) -> Self {
         Self { detail: Detail::Verdict, ..*self }
+    }
+
+    /// The same with flat cells, as rays see them. Lower bounds on distances are those from discs, balls and
+    /// flat cells.
+    pub(crate) fn flat(&self) -> Self {
+        Self { slab: 0.0, ..*self }
     }
 
     pub(crate) fn scale(&self) -> f64 {
@@ -327,7 +336,7 @@ impl<'a> Elements<'a> {
         if !self.arrays.is_on_sheet(i) {
             return None;
         }
-        let slab = f64::from(SLAB * self.arrays.radii[i]) * (1.0 + 1e-6);
+        let slab = f64::from(self.slab * self.arrays.radii[i]) * (1.0 + 1e-6);
         Some((FlatDisc { centre, normal: self.normal(i), radius }, slab))
     }
 
@@ -383,14 +392,14 @@ impl<'a> Elements<'a> {
             let cells = local.min(0.5 * self.arrays.reach);
             // As `ScanArrays::obstacle_reach`, with the thickness of a disc.
             let reaches = discs.select(cells.max(of_discs * (1.0 + THICKNESS)), balls);
-            return Parts { radii, reaches, slabs: local * SLAB, cells, discs };
+            return Parts { radii, reaches, slabs: local * self.slab, cells, discs };
         }
         let (mut radii, mut reaches, mut slabs) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
         let (mut cells, mut discs) = ([0.0; WIDTH], 0_u64);
         for (lane, i) in (first..first + count).enumerate() {
             radii[lane] = self.radius(i);
             reaches[lane] = self.arrays.obstacle_reach(i);
-            slabs[lane] = SLAB * self.arrays.radii[i];
+            slabs[lane] = self.slab * self.arrays.radii[i];
             cells[lane] = self.arrays.cell_radius(i);
             discs |= u64::from(self.is_disc(i)) << lane;
         }
