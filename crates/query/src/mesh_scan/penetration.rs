@@ -189,17 +189,17 @@ impl<'s> MeshScanProbe<'s> {
             let own = mesh.pose().apply_inverse((found.place - t).into());
             found.place = t + Vector::from(mesh.pose().apply(foot(mesh.mesh(), self.view, level, own)));
         }
-        if at != Where::OnA {
-            let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
-            let (depth, uphill) = world_depth_in(&self.whole_scan, &found.place, working)?;
-            found.depth += depth;
-            found.in_a = depth;
-            found.uphill += uphill;
-        }
         if at != Where::OnB {
             let (depth, uphill) = depth_in_solid(&self.solid_view(), &mesh, found.place - t)?;
             found.depth += depth;
             found.uphill += uphill;
+        }
+        if at != Where::OnA {
+            let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[0]);
+            let own = world_depth_in(&self.whole_scan, &found.place, working)?;
+            found.depth = own.with_ball(found.depth);
+            found.in_a = own.length;
+            found.uphill += own.uphill;
         }
         Some(found)
     }

@@ -10,7 +10,7 @@ use crate::penetration::probe::Vector;
 use crate::solid::cast::all_hits;
 use crate::solid::core::Solid;
 use crate::solid::crossing::Crossing;
-use crate::solid::distance::distance;
+use crate::solid::distance::{Nearest, nearest};
 use crate::solid::elements::{Element, Elements};
 use crate::solid::ray::StoredRay;
 
@@ -88,29 +88,46 @@ pub(crate) fn counts(elements: &Elements<'_>, interior: Interior) -> bool {
     interior == Interior::Solid && !matches!(elements.semantics, Semantics::Thickened(_))
 }
 
-/// The distance of a place inside a solid scan from its surface, in the stored frame, and the direction away
-/// from there. `None` unless the place is surely inside.
+/// The depth of a place in a solid scan.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Depth {
+    /// A lower bound on the distance of the place from the discs, the balls and the flat cells.
+    pub(crate) length: f64,
+    /// The greatest distance of a place of the nearest cell from its disc.
+    pub(crate) hole: f64,
+    /// The direction away from the nearest disc or ball.
+    pub(crate) uphill: Vector,
+}
+
+impl Depth {
+    /// The greatest length such that every shorter shift leaves a contact or an overlap with a ball of this
+    /// radius about the place: within a hole between discs, the ball touches nothing before it reaches a rim.
+    pub(crate) fn with_ball(&self, radius: f64) -> f64 {
+        self.length + (radius * radius - self.hole * self.hole).max(0.0).sqrt()
+    }
+}
+
+/// The depth of a place in a solid scan, in the stored frame. `None` unless the place is surely inside.
 pub(crate) fn depth_in(
     elements: &Elements<'_>,
     place: &Vector,
     (level, found, scratch): Working<'_>,
-) -> Option<(f64, Vector)> {
+) -> Option<Depth> {
     if !is_surely_inside(elements, place, (level, found, scratch)) {
         return None;
     }
-    let (depth, foot) = foot(elements, place, level)?;
-    Some((depth, (place - foot).try_normalize(0.0).unwrap_or_else(Vector::zeros)))
+    let Nearest { i, gap, lower, .. } = foot(elements, place, level)?;
+    let uphill = (place - gap.on_disc).try_normalize(0.0).unwrap_or_else(Vector::zeros);
+    Some(Depth { length: lower, hole: elements.hole(i), uphill })
 }
 
 /// The same with all places and lengths in the world.
-pub(crate) fn world_depth_in(
-    elements: &Elements<'_>,
-    place: &Vector,
-    working: Working<'_>,
-) -> Option<(f64, Vector)> {
+pub(crate) fn world_depth_in(elements: &Elements<'_>, place: &Vector, working: Working<'_>) -> Option<Depth> {
     let frame = *elements.placed.stored_to_world();
-    let (depth, uphill) = depth_in(elements, &frame.apply_inverse((*place).into()).into(), working)?;
-    Some((depth * frame.scale(), frame.rotate(uphill.into()).into()))
+    let Depth { length, hole, uphill } =
+        depth_in(elements, &frame.apply_inverse((*place).into()).into(), working)?;
+    let [length, hole] = [length, hole].map(|length| length * frame.scale());
+    Some(Depth { length, hole, uphill: frame.rotate(uphill.into()).into() })
 }
 
 /// Returns `true` if a place of the world is inside the surface of a scan.
@@ -160,15 +177,12 @@ pub(crate) fn nearest_part(elements: &Elements<'_>, place: &Vector, level: Level
     match elements.element(elements.placed.scan().nearest_point((*place).into()) as usize) {
         Element::Ball(centre, radius) => Some((centre, radius)),
         // Another disc may be nearer than that of the nearest point.
-        Element::Disc(_) => Some((foot(elements, place, level)?.1, 0.0)),
+        Element::Disc(_) => Some((foot(elements, place, level)?.gap.on_disc, 0.0)),
     }
 }
 
-/// The distance of a place of the stored frame from a scan, and the nearest place of the discs and balls.
-fn foot(elements: &Elements<'_>, place: &Vector, level: Level) -> Option<(f64, Vector)> {
+/// The part of a scan with flat cells that is nearest to a place of the stored frame.
+fn foot(elements: &Elements<'_>, place: &Vector, level: Level) -> Option<Nearest> {
     // A point has no corners.
-    let working = (level, &mut Vec::new());
-    let found = distance(&elements.flat(), Some(&Solid::point(*place)), f64::INFINITY, working)?;
-    let foot = elements.placed.stored_to_world().apply_inverse(found.points[0]);
-    Some((found.lower / elements.scale(), foot.into()))
+    nearest(&elements.flat(), &Solid::point(*place), f64::INFINITY, (level, &mut Vec::new()))
 }

@@ -8,8 +8,8 @@ use crate::penetration::survey::ContactSurvey;
 
 pub(crate) type Vector = Vector3<f64>;
 
-/// The search ends once the bounds for a scan differ by this, in sampling radii. The upper one is further
-/// from the exact penetration: discs reach beyond edges.
+/// The search ends once the bounds for a scan differ by this, in sampling radii. Discs reach beyond edges, so
+/// the upper bound may exceed the exact penetration by more.
 pub(crate) const SLACK: f64 = 0.4;
 
 /// Where a place that two things have in common is in each of them.

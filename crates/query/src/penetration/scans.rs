@@ -11,7 +11,7 @@ use crate::pair::placed_balls::is_proper;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{
-    TESTED, contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_part,
+    Depth, TESTED, contains, counts, some_points, world_axes, world_ball, world_depth_in, world_nearest_part,
 };
 use crate::penetration::probe::{Deep, Probe, SLACK, Vector, Where};
 use crate::penetration::search::{SearchScratch, search};
@@ -181,12 +181,18 @@ impl ScanProbe<'_> {
             found.depth += radius;
             found.in_a += if k == 0 { radius } else { 0.0 };
         }
+        let mut other: Option<Depth> = None;
         for k in (0..2).filter(|&k| is_inside[k]) {
             let working = (self.contact.level, &mut *self.crossings, &mut self.contact.gathers[k]);
-            let (depth, uphill) = world_depth_in(&self.wholes[k], &(found.place - shifts[k]), working)?;
-            found.depth += depth;
-            found.in_a += if k == 0 { depth } else { 0.0 };
-            found.uphill += uphill;
+            let own = world_depth_in(&self.wholes[k], &(found.place - shifts[k]), working)?;
+            // The depth so far is the radius of a ball in the other scan, which has holes as well.
+            found.depth = match other {
+                None => own.with_ball(found.depth),
+                Some(other) => own.with_ball(other.length + margin).min(other.with_ball(own.length + margin)),
+            };
+            other = Some(own);
+            found.in_a += if k == 0 { own.length } else { 0.0 };
+            found.uphill += own.uphill;
         }
         Some(found)
     }

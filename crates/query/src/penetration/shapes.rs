@@ -90,9 +90,9 @@ impl ShapeProbe<'_, '_> {
         let (place, (own, uphill)) = solid.deep_near(&place);
         let elements = self.elements;
         let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
-        let (in_a, away) = depth_in(elements, &place, working)?;
-        let depth = elements.margin + own + in_a;
-        Some(Deep { place, at: Where::Inside, depth, in_a, uphill: uphill + away })
+        let own_in_a = depth_in(elements, &place, working)?;
+        let (depth, in_a) = (own_in_a.with_ball(own + elements.margin), own_in_a.length);
+        Some(Deep { place, at: Where::Inside, depth, in_a, uphill: uphill + own_in_a.uphill })
     }
 
     /// Breaks if the budget is spent. A test of the shape counts as an evaluation.

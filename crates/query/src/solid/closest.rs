@@ -66,7 +66,8 @@ pub(crate) fn closest(
         let next = points[0] - points[1];
         let along = v.dot(&next);
         lower = lower.max(along / square.sqrt());
-        if square - along <= PRECISION * square || simplex.has(&next) {
+        // Also if a support map returns what is not a number.
+        if !along.is_finite() || square - along <= PRECISION * square || simplex.has(&next) {
             break;
         }
         size_sq = size_sq.max(next.norm_squared());
@@ -83,7 +84,7 @@ pub(crate) fn closest(
     }
     let points = [0, 1].map(|k| weighted(&simplex.points.map(|of| of[k]), &simplex.weights));
     let distance = v.norm();
-    // Also if a support map returns what is not a number.
+    // `max` and `min` ignore what is not a number.
     let lower = (lower - 4.0 * ROUNDING * size_sq.sqrt()).max(0.0).min(distance);
     Closest { points, distance, lower }
 }
@@ -103,8 +104,8 @@ impl Simplex {
         self.vertices[..self.count].contains(vertex)
     }
 
-    /// Returns the weights of all vertices and of `next`, which is nearer to the origin than all along the
-    /// way there. `None` if the tetrahedron contains the origin, for which the weights are kept.
+    /// Returns the weights of the point nearest to the origin, with `next` as the newest vertex. The other
+    /// vertices alone are no nearer. `None` if the tetrahedron contains the origin; its weights are then set.
     fn weights_with(&mut self, next: Vector, points: [Vector; 2]) -> Option<[f64; 4]> {
         (self.vertices[self.count], self.points[self.count]) = (next, points);
         let p = &self.vertices;
@@ -151,8 +152,8 @@ fn of_segment(a: &Vector, b: &Vector) -> [f64; 2] {
     [1.0 - share, share]
 }
 
-/// The weights of the point of a triangle nearest to the origin, given a normal. The edge from `a` to `b` is
-/// further away than `c`.
+/// The weights of the point of a triangle nearest to the origin, given a normal. That point is not on the
+/// edge from `a` to `b`.
 fn of_triangle([a, b, c]: [&Vector; 3], normal: &Vector) -> [f64; 3] {
     // Areas of the triangles of the foot and each edge.
     let area = |p: &Vector, q: &Vector| p.cross(q).dot(normal);
@@ -166,8 +167,8 @@ fn of_triangle([a, b, c]: [&Vector; 3], normal: &Vector) -> [f64; 3] {
     if by_b.norm_squared() < by_a.norm_squared() { [0.0, q, r] } else { [s, 0.0, t] }
 }
 
-/// The same of a tetrahedron, whose first three vertices make a triangle that is further away than the last,
-/// and `true` if it contains the origin.
+/// The same of a tetrahedron, and `true` if it contains the origin. The nearest point is not on the face of
+/// the first three vertices.
 fn of_tetrahedron(p: &[Vector; 4]) -> ([f64; 4], bool) {
     /// Distance of the origin from the point that the weights give, relative to the greatest vertex, up
     /// to which it counts as inside. In a flat tetrahedron rounding decides the sides.
@@ -199,4 +200,22 @@ fn of_tetrahedron(p: &[Vector; 4]) -> ([f64; 4], bool) {
     let weights = shares.map(|share| share / sum);
     let size = p.iter().map(Vector::norm).fold(0.0, f64::max);
     if weighted(p, &weights).norm() <= OFF * size { (weights, true) } else { (offer(true).0, false) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A support map that returns what is not a number ends the search with the points before.
+    #[test]
+    fn broken_support_maps_end_the_search() {
+        let there = Vector::new(3.0, 0.0, 0.0);
+        let support = |d: &Vector| {
+            let d = d.normalize();
+            [if d.x > 0.99 { Vector::repeat(f64::NAN) } else { d }, there]
+        };
+        let found = closest(support, Vector::new(-3.0, 2.0, 0.0), [0.0, f64::INFINITY]);
+        assert!(found.distance >= 2.0 && found.distance < 4.0, "{found:?}");
+        assert!(found.lower <= 2.0 && (found.points[0].norm() - 1.0).abs() < 1e-12, "{found:?}");
+    }
 }

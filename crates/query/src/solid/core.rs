@@ -45,7 +45,8 @@ pub(crate) struct Solid<'a> {
     pub(crate) inside: Vector,
 }
 
-/// A core, relative to the centre of its box, whose extents are bounded more closely than those of the box.
+/// A core, relative to the centre of its box, whose distances and extents are bounded more closely than those
+/// of the box.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum LaneCore<'c> {
     /// Nothing but its box is known.
@@ -184,6 +185,11 @@ impl<'a> Solid<'a> {
     /// points, not only bounds.
     pub(crate) fn is_closed_in_lanes(&self) -> bool {
         self.is_box() || self.round_ends().is_some()
+    }
+
+    /// Returns `true` if nothing is known of the core but its support map.
+    pub(crate) fn is_own(&self) -> bool {
+        matches!(self.core, Core::Own(..))
     }
 
     pub(crate) fn is_point(&self) -> bool {
@@ -463,9 +469,10 @@ fn spanned(axes: &[Vector; 3], support: impl Fn(&Vector) -> Vector) -> (Vector, 
 fn in_trapezium(p: [f64; 2], half: f64, [below, above]: [f64; 2]) -> [f64; 2] {
     let [beside, height] = p;
     let side = [above - below, 2.0 * half];
-    // Inside, if it is neither above, nor below, nor to the outer side of the slanted side.
+    // Inside, if it is neither above, nor below, nor to the outer side of the slanted side, which is a point
+    // or level if the cone is flat.
     let within = side[1] * (beside - below) - side[0] * (height + half) <= 0.0;
-    if within && height.abs() <= half {
+    if within && height.abs() <= half && beside <= below.max(above) {
         return p;
     }
     let lids = [[beside.min(below), -half], [beside.min(above), half]];

@@ -45,21 +45,37 @@ impl Solid<'_> {
     /// The deepest place of a shape whose core is a point or a segment, against `out`, over a disc with that
     /// axis. `None` if no part of the shape is over the disc. O(1).
     pub(crate) fn deepest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Deepest> {
-        let from = self.centre - disc.centre;
-        let edge = self.axes[0] * self.half.x;
+        Deepest::of_capsule((self.centre, self.axes[0] * self.half.x), self.radius, (disc, out))
+    }
+}
+
+impl Deepest {
+    /// The deepest place of a capsule, given by its centre, the way from there to an end, and its radius,
+    /// against `out` over a disc with that axis. `None` if no part of the capsule is over the disc.
+    pub(crate) fn of_capsule(
+        (centre, edge): (Vector, Vector),
+        radius: f64,
+        (disc, out): (&FlatDisc, &Vector),
+    ) -> Option<Self> {
+        let from = centre - disc.centre;
         let (middle, rise) = (out.dot(&from), out.dot(&edge));
         let (edge, fall) = if rise > 0.0 { (-edge, rise) } else { (edge, -rise) };
         let (from, way) = (from - out * middle, edge + out * fall);
-        let share = deepest_share(&from, &way, fall, [disc.radius, self.radius]);
+        let share = deepest_share(&from, &way, fall, [disc.radius, radius]);
         let across = from + way * share;
         let away = across.norm();
         let beside = away - disc.radius;
         let inwards = if beside > 0.0 { disc.radius / away } else { 1.0 };
-        (beside <= self.radius + ROUNDING * disc.radius).then(|| Deepest {
+        (beside <= radius + ROUNDING * disc.radius).then(|| Self {
             height: middle - fall * share,
-            beside: beside.clamp(0.0, self.radius),
+            beside: beside.clamp(0.0, radius),
             on_disc: disc.centre + across * inwards,
         })
+    }
+
+    /// The depth below the plane of the disc that the sphere of this radius about the point reaches.
+    pub(crate) fn depth(&self, radius: f64) -> f64 {
+        (radius * radius - self.beside * self.beside).sqrt() - self.height
     }
 }
 

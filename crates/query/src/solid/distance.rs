@@ -29,36 +29,29 @@ struct Apart<'s, 'a> {
     lower: f64,
 }
 
+/// The part of a scan that is nearest to a shape, in the stored frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Nearest {
+    /// The point whose disc or ball it is.
+    pub(crate) i: usize,
+    pub(crate) gap: Gap,
+    /// The distance of the disc or ball from the shape.
+    pub(crate) upper: f64,
+    /// A lower bound on the distance of the obstacle.
+    pub(crate) lower: f64,
+}
+
 /// Bounds the distance of `solid` and the scan, up to `within` in the world. `None` if it is further
 /// away, or invalid. `corners` is memory for those of the shape.
 pub(crate) fn distance(
     elements: &Elements<'_>,
     solid: Option<&Solid<'_>>,
     within: f64,
-    (level, corners): (Level, &mut Vec<[f32; 3]>),
+    working: (Level, &mut Vec<[f32; 3]>),
 ) -> Option<ShapeDistance> {
-    let solid = solid?;
-    let scale = elements.scale();
-    // Enclosures, because the nearest place of the obstacle may be outside the boxes.
-    let near = Near::new(elements, solid, elements.certifies, corners);
-    let (most, none) = (within / scale, f64::INFINITY);
-    let mut search = Apart { near, within: most, upper: none, best: None, plane: None, lower: none };
-    search.near.limit(most);
-    // Ends early if they touch.
-    if search.near_centre(level).is_continue() {
-        // The descent bounds what is near again, with the enclosures of nodes.
-        search.lower = none;
-        let near = search.near;
-        let starts = elements.starts(solid, search.upper.min(most));
-        let _touching = near.descend(level, &starts, &mut search);
-    }
-    let (i, gap) = search.best.filter(|_| search.upper * scale <= within)?;
-    let upper = search.upper;
-    let lower = match elements.semantics {
-        Semantics::Thickened(_) => upper,
-        _ if !elements.certifies => 0.0,
-        _ => search.lower.clamp(0.0, upper),
-    };
+    let (solid, scale) = (solid?, elements.scale());
+    let found = nearest(elements, solid, (within / scale).next_up(), working)?;
+    let Nearest { i, gap, upper, lower } = Some(found).filter(|it| it.upper * scale <= within)?;
     // From the core to the shape.
     let way = gap.on_disc - gap.on_core;
     let length = way.norm();
@@ -72,6 +65,37 @@ pub(crate) fn distance(
         band: elements.band(i),
         evidence: if is_ball { Evidence::Certified } else { Evidence::Estimated },
     })
+}
+
+/// The part of the scan that is nearest to `solid`, up to `most`. `None` if all are further away. `corners`
+/// is memory for those of the shape.
+pub(crate) fn nearest(
+    elements: &Elements<'_>,
+    solid: &Solid<'_>,
+    most: f64,
+    (level, corners): (Level, &mut Vec<[f32; 3]>),
+) -> Option<Nearest> {
+    // Enclosures, because the nearest place of the obstacle may be outside the boxes.
+    let near = Near::new(elements, solid, elements.certifies, corners);
+    let none = f64::INFINITY;
+    let mut search = Apart { near, within: most, upper: none, best: None, plane: None, lower: none };
+    search.near.limit(most);
+    // Ends early if they touch.
+    if search.near_centre(level).is_continue() {
+        // The descent bounds what is near again, with the enclosures of nodes.
+        search.lower = none;
+        let near = search.near;
+        let starts = elements.starts(solid, search.upper.min(most));
+        let _touching = near.descend(level, &starts, &mut search);
+    }
+    let (i, gap) = search.best.filter(|_| search.upper <= most)?;
+    let upper = search.upper;
+    let lower = match elements.semantics {
+        Semantics::Thickened(_) => upper,
+        _ if !elements.certifies => 0.0,
+        _ => search.lower.clamp(0.0, upper),
+    };
+    Some(Nearest { i, gap, upper, lower })
 }
 
 impl Apart<'_, '_> {

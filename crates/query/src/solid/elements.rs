@@ -37,7 +37,7 @@ pub(crate) enum Element {
 
 impl Element {
     /// The nearest points of a core and the disc or ball. Also the distance up to which they meet without a
-    /// margin. If the shape is further away than `most` and than that, any distance that exceeds both.
+    /// margin. Beyond both `most` and that distance, any two points that are further apart.
     pub(crate) fn gap(&self, solid: &Solid<'_>, most: f64) -> (Gap, f64) {
         match self {
             Self::Disc(disc) => {
@@ -87,10 +87,9 @@ pub(crate) struct Elements<'a> {
 pub(crate) struct LeafGaps {
     /// From the discs, with their thickness, and from the balls.
     pub(crate) elements: [f32; WIDTH],
-    /// From the volumes that contain the obstacle near the points.
+    /// From the cells, which contain the obstacle near the points unless they are [flat](Elements::flat).
     pub(crate) cells: [f32; WIDTH],
-    /// Upper bounds on the distances from the points themselves, if the core is a box, a segment or a
-    /// point.
+    /// Upper bounds on the distances from the points themselves, if [`Solid::is_closed_in_lanes`].
     pub(crate) points: [f32; WIDTH],
 }
 
@@ -167,8 +166,8 @@ impl<'a> Elements<'a> {
         Self { detail: Detail::Verdict, ..*self }
     }
 
-    /// The same with flat cells, as rays see them. Lower bounds on distances are those from discs, balls and
-    /// flat cells.
+    /// The same with flat cells, as rays see them. Lower bounds on distances are then those from the discs,
+    /// the balls and the flat cells, unless only enclosures count.
     pub(crate) fn flat(&self) -> Self {
         Self { slab: 0.0, ..*self }
     }
@@ -304,8 +303,8 @@ impl<'a> Elements<'a> {
         solid.reaches(&disc, solid.radius + self.margin.max(disc.thickness()))
     }
 
-    /// A lower bound on the distance of a core from the obstacle near a point; any that exceeds `beyond` if
-    /// the distance does. The core is above `plane`.
+    /// A lower bound on the distance of a core from the cell or the ball of a point; any that exceeds
+    /// `beyond` if the distance does. The core is above `plane`.
     pub(crate) fn cell_gap(
         &self,
         solid: &Solid<'_>,
@@ -316,9 +315,21 @@ impl<'a> Elements<'a> {
         let Some((disc, slab)) = self.cell(i, centre, reach) else {
             return solid.distance(&centre) * (1.0 - 1e-9) - reach;
         };
+        // Lanes know the distances of other cores from points, or bounds that are as good.
+        let by_ball =
+            if solid.is_own() { solid.distance(&centre) * (1.0 - 1e-9) - reach } else { f64::NEG_INFINITY };
         let above = plane.map_or(0.0, |plane| plane.above(&disc));
         let lower = if above > beyond + slab { above } else { solid.gap(&disc, beyond + slab).lower };
-        lower - slab
+        by_ball.max(lower - slab)
+    }
+
+    /// The greatest distance of a place of the cell of a point from its disc.
+    pub(crate) fn hole(&self, i: usize) -> f64 {
+        if self.is_disc(i) {
+            f64::from(self.arrays.obstacle_reach(i) - self.arrays.discs.get(i))
+        } else {
+            0.0
+        }
     }
 
     /// Returns `true` if the obstacle near a point is proven to be further than `within` from a core.

@@ -1,8 +1,9 @@
 //! Lower bounds on the distance of a shape from nodes and points, several at a time, in single
 //! precision.
 //!
-//! The shape is represented by the box about its core. Along the axes of either box the gap of two
-//! boxes is that of two intervals; the three gaps along orthogonal axes combine to a distance.
+//! For nodes, the shape is represented by the box about its core. Along the axes of either box the gap of two
+//! boxes is that of two intervals; the three gaps along orthogonal axes combine to a distance. The distances
+//! of points from a truncated cone are exact, and those from a hull are bounded by planes.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
@@ -200,11 +201,11 @@ impl<'c> LaneBox<'c> {
     }
 }
 
-/// Lower bounds on the distances of a hull of corners from points, all relative to the same place, and the
-/// unit normals of the planes between them.
+/// Lower bounds on the distances of a hull of corners from points, and the unit normals of the planes that
+/// prove them. Corners and points are relative to the same place.
 ///
-/// `way` leads from the hull to each point, roughly. Steps of Frank & Wolfe ("An algorithm for quadratic
-/// programming", Naval Research Logistics Quarterly 3, 1956) move a point of the hull towards the nearest.
+/// `way` leads roughly from the hull to each point. Steps of Frank & Wolfe (1956) move a place of the hull
+/// towards the nearest one.
 #[inline(always)]
 fn of_corners<S: Simd>(
     simd: S,
@@ -273,7 +274,9 @@ fn of_round<S: Simd>(
         least = own.min(least);
     }
     let beyond_side = (beside - below) * side[1] - low * side[0];
-    let is_in: mask32x16<S> = beyond_side.max(-low).max(high).simd_le(0.0);
+    // If the cone is flat, the slanted side is a point.
+    let beyond_rim = beside - below.max(above);
+    let is_in: mask32x16<S> = beyond_side.max(beyond_rim).max(-low).max(high).simd_le(0.0);
     let rise = out * product(across, *normals) / beside.max(f32::MIN_POSITIVE) + up * along(*normals, axis);
     (is_in.select(zero, least), is_in.select(zero, rise))
 }
@@ -355,9 +358,12 @@ mod tests {
         let (mut apart, mut of_points, mut of_discs) = ([0_u32; KINDS], [0.0; KINDS], [0.0; KINDS]);
         for round in 0..300 {
             let kind = round % KINDS;
-            let pose = rotation(rng).with_translation(point_in(rng, 1.0));
+            let turn = if round % 5 == 0 { Pose::IDENTITY } else { rotation(rng) };
+            let pose = turn.with_translation(point_in(rng, 1.0));
             let points: Vec<[f64; 3]> = (0..7).map(|_| pose.apply(point_in(rng, 0.5))).collect();
-            let half: [f64; 3] = [0, 1, 2].map(|_| rng.random_range(0.0..0.6));
+            // Flat ones and poles as well.
+            let half: [f64; 3] =
+                [0, 1, 2].map(|_| rng.random_range(0.0..0.6) * f64::from(rng.random_range(0..5_u8).min(1)));
             let shape = match kind {
                 0 => Shape::Capsule { ends: [points[0], points[1]], radius: 0.0 },
                 1 => Shape::Box { pose, half, radius: 0.0 },
@@ -369,9 +375,12 @@ mod tests {
             let solid = Solid::new(&shape, &Pose::IDENTITY).unwrap();
             let mut corners = Vec::new();
             let lane_box = LaneBox::new(&solid, 2.0, solid.lane_core(&mut corners));
-            // On and in the axis of a cone as well.
+            // On the axis of a cone, and in the plane across it, as well.
             let discs: [FlatDisc; 16] = [(); 16].map(|()| {
-                let off = Vector::from(point_in(rng, 1.5)) * f64::from(rng.random_range(0..3_u8)) * 0.5;
+                let mut off = Vector::from(point_in(rng, 1.5)) * f64::from(rng.random_range(0..3_u8)) * 0.5;
+                if rng.random_range(0..4) == 0 {
+                    off -= solid.axes[1] * off.dot(&solid.axes[1]);
+                }
                 let along =
                     solid.axes[1] * rng.random_range(-1.0..1.0) * f64::from(rng.random_range(0..2_u8));
                 let normal = Vector::from(unit_vector(rng));

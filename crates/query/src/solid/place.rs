@@ -97,8 +97,8 @@ fn at_border(solid: &Solid<'_>, disc: &FlatDisc, out: Vector, most: f64) -> Opti
 /// is over the disc.
 fn deepest(solid: &Solid<'_>, disc: &FlatDisc, normal: Vector) -> Option<Over> {
     if solid.is_segment() {
-        let Deepest { height, beside, on_disc } = solid.deepest_over(disc, &normal)?;
-        let depth = (solid.radius * solid.radius - beside * beside).sqrt() - height;
+        let deepest = solid.deepest_over(disc, &normal)?;
+        let (depth, Deepest { height, beside, on_disc }) = (deepest.depth(solid.radius), deepest);
         let apart = (height * height + beside * beside).sqrt();
         return Some(Over { place: Place { point: on_disc, normal, depth }, is_beside: beside > 0.0, apart });
     }

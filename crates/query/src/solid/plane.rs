@@ -15,18 +15,20 @@ pub(crate) struct Plane {
     /// A unit vector, which points to the side above.
     normal: Vector,
     height: f64,
+    /// The greatest coordinate of a point of the plane.
+    far: f64,
 }
 
 impl Plane {
     /// The plane through a point with this unit normal.
     pub(crate) fn through(point: &Vector, normal: Vector) -> Self {
-        Self { normal, height: normal.dot(point) }
+        Self { normal, height: normal.dot(point), far: point.amax() }
     }
 
     /// A lower bound on the distance of anything above the plane from a disc.
     pub(crate) fn above(&self, disc: &FlatDisc) -> f64 {
         let rim = disc.radius * self.normal.cross(&disc.normal).norm();
         let at = self.normal.dot(&disc.centre);
-        self.height - at - rim - ROUNDING * (self.height.abs() + at.abs())
+        self.height - at - rim - ROUNDING * (self.far + disc.centre.amax() + disc.radius)
     }
 }

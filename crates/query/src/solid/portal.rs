@@ -10,6 +10,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::Solid;
+use crate::solid::deepest::Deepest;
 
 type Vector = Vector3<f64>;
 
@@ -66,7 +67,23 @@ impl Solid<'_> {
         if across.norm_squared() <= disc.radius * disc.radius {
             return Some(Lowest { height, on_disc: disc.centre + across, is_beside: false, other: height });
         }
-        self.lowest_of_face(disc, out).or_else(|| body.lowest(body.about_axis(low)?))
+        let flat = self.lowest_of_face(disc, out);
+        flat.or_else(|| self.lowest_of_side(disc, out)).or_else(|| body.lowest(body.about_axis(low)?))
+    }
+
+    /// The lowest place if that is on the side of a cylinder: it is that of the capsule about the cylinder,
+    /// where this is between the ends.
+    fn lowest_of_side(&self, disc: &FlatDisc, out: &Vector) -> Option<Lowest> {
+        let [radius, above] = self.round_ends()?;
+        if above != radius || self.radius > 0.0 {
+            return None;
+        }
+        let axis = self.axes[1];
+        let found = Deepest::of_capsule((self.centre, axis * self.half.y), radius, (disc, out))?;
+        let (on_disc, height) = (found.on_disc, -found.depth(radius));
+        let lowest = on_disc + out * height - self.centre;
+        let is_between = axis.dot(&lowest).abs() <= self.half.y;
+        is_between.then_some(Lowest { height, on_disc, is_beside: false, other: height })
     }
 
     /// The lowest place if that is on a flat face of a box, a cylinder or a cone: the whole shape is above

@@ -232,7 +232,7 @@ impl PlaceVisitor for Touch<'_, '_> {
         }
         for (block, first, count) in elements.arrays.leaves.blocks(number) {
             let gaps = elements.leaf_gaps(simd, lane_box, (number, block, first, count));
-            if solid.has_projection() {
+            if solid.is_closed_in_lanes() {
                 let first_in = Bits(Elements::within(simd, (&gaps.points, count), most)).next();
                 first_in
                     .map_or(ControlFlow::Continue(()), |lane| found.hold(elements, solid, first + lane))?;

@@ -3,6 +3,7 @@
 
 mod all;
 mod batch;
+mod broken_shapes;
 mod clashes;
 mod coherence;
 mod curves;

@@ -97,7 +97,7 @@ fn scans_of_known_penetration() {
             }
         }
         println!("noise {noise}: upper at most {:.2} r off, lower at least {:.2} of it", worst.0, worst.1);
-        assert!(worst.1 >= 0.5, "lower at least {} of upper", worst.1);
+        assert!(worst.1 >= 0.5, "lower only {} of upper", worst.1);
     }
 }
 
