@@ -24,9 +24,10 @@ pub enum Interior {
 /// mesh, and a mesh out of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penetration {
-    /// A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found. Rays judge
-    /// which places are inside a [solid](Interior::Solid) scan; the bound is proven as far as they are right.
-    /// The surface of such a scan is that of its discs and, between them, of the flat cells that rays see
+    /// A lower bound: every shorter shift leaves a contact or an overlap. 0 if no bound was found.
+    ///
+    /// Rays judge which places are inside a [solid](Interior::Solid) scan. The bound is proven as far as
+    /// they are right, and as the discs leave no hole through which a part may pass
     /// (`docs/theory/penetration.md`).
     pub lower: f64,
     /// The length of a shift after which the two are separate: 0 if they already are, infinite if a pose or

@@ -93,15 +93,17 @@ pub(crate) fn counts(elements: &Elements<'_>, interior: Interior) -> bool {
 pub(crate) struct Depth {
     /// A lower bound on the distance of the place from the discs, the balls and the flat cells.
     pub(crate) length: f64,
-    /// The greatest distance of a place of the nearest cell from its disc.
+    /// The greatest distance of a place of the cell of the nearest disc from that disc: an estimate of the
+    /// holes between discs nearby.
     pub(crate) hole: f64,
     /// The direction away from the nearest disc or ball.
     pub(crate) uphill: Vector,
 }
 
 impl Depth {
-    /// The greatest length such that every shorter shift leaves a contact or an overlap with a ball of this
-    /// radius about the place: within a hole between discs, the ball touches nothing before it reaches a rim.
+    /// A length such that every shorter shift leaves a contact or an overlap with a ball of this radius about
+    /// the place. A ball whose centre has left through a hole meets the discs around the hole only while it
+    /// reaches their rims.
     pub(crate) fn with_ball(&self, radius: f64) -> f64 {
         self.length + (radius * radius - self.hole * self.hole).max(0.0).sqrt()
     }

@@ -65,9 +65,11 @@ pub(crate) fn closest(
         let points = support(&-v);
         let next = points[0] - points[1];
         let along = v.dot(&next);
+        if !along.is_finite() {
+            break;
+        }
         lower = lower.max(along / square.sqrt());
-        // Also if a support map returns what is not a number.
-        if !along.is_finite() || square - along <= PRECISION * square || simplex.has(&next) {
+        if square - along <= PRECISION * square || simplex.has(&next) {
             break;
         }
         size_sq = size_sq.max(next.norm_squared());

@@ -337,6 +337,15 @@ impl<'a> Solid<'a> {
         }
     }
 
+    /// A lower bound on the distance of `x` from the core.
+    pub(crate) fn distance_bound(&self, x: &Vector) -> f64 {
+        if self.has_projection() {
+            return self.distance(x) * (1.0 - 1e-9);
+        }
+        let support = |d: &Vector| [self.support(d) - x, Vector::zeros()];
+        closest(support, self.inside - x, [0.0, f64::INFINITY]).lower
+    }
+
     /// The distance of `x` from the core.
     pub(crate) fn distance(&self, x: &Vector) -> f64 {
         (x - self.nearest(x)).norm()

@@ -37,7 +37,7 @@ pub(crate) enum Element {
 
 impl Element {
     /// The nearest points of a core and the disc or ball. Also the distance up to which they meet without a
-    /// margin. Beyond both `most` and that distance, any two points that are further apart.
+    /// margin. If the shape is further away than `most` and than that, any two points that are, too.
     pub(crate) fn gap(&self, solid: &Solid<'_>, most: f64) -> (Gap, f64) {
         match self {
             Self::Disc(disc) => {
@@ -313,11 +313,13 @@ impl<'a> Elements<'a> {
     ) -> f64 {
         let (centre, reach) = (self.position(i), f64::from(self.arrays.obstacle_reach(i)));
         let Some((disc, slab)) = self.cell(i, centre, reach) else {
-            return solid.distance(&centre) * (1.0 - 1e-9) - reach;
+            return solid.distance_bound(&centre) - reach;
         };
-        // Lanes know the distances of other cores from points, or bounds that are as good.
-        let by_ball =
-            if solid.is_own() { solid.distance(&centre) * (1.0 - 1e-9) - reach } else { f64::NEG_INFINITY };
+        // Lanes know the distances of other cores from points, or bounds on them.
+        let by_ball = if solid.is_own() { solid.distance_bound(&centre) - reach } else { f64::NEG_INFINITY };
+        if by_ball > beyond {
+            return by_ball;
+        }
         let above = plane.map_or(0.0, |plane| plane.above(&disc));
         let lower = if above > beyond + slab { above } else { solid.gap(&disc, beyond + slab).lower };
         by_ball.max(lower - slab)
@@ -325,17 +327,14 @@ impl<'a> Elements<'a> {
 
     /// The greatest distance of a place of the cell of a point from its disc.
     pub(crate) fn hole(&self, i: usize) -> f64 {
-        if self.is_disc(i) {
-            f64::from(self.arrays.obstacle_reach(i) - self.arrays.discs.get(i))
-        } else {
-            0.0
-        }
+        let beyond = self.arrays.cell_radius(i) - self.arrays.discs.get(i);
+        if self.is_disc(i) { f64::from(beyond.max(0.0)) } else { 0.0 }
     }
 
     /// Returns `true` if the obstacle near a point is proven to be further than `within` from a core.
     pub(crate) fn is_cell_beyond(&self, solid: &Solid<'_>, i: usize, within: f64) -> bool {
         let (centre, reach) = (self.position(i), f64::from(self.arrays.obstacle_reach(i)));
-        if solid.distance(&centre) * (1.0 - 1e-9) - reach > within {
+        if solid.distance_bound(&centre) - reach > within {
             return true;
         }
         let cell = self.cell(i, centre, reach);

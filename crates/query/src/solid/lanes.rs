@@ -274,7 +274,7 @@ fn of_round<S: Simd>(
         least = own.min(least);
     }
     let beyond_side = (beside - below) * side[1] - low * side[0];
-    // If the cone is flat, the slanted side is a point.
+    // The slanted side of a flat core is a point or level, and bounds nothing.
     let beyond_rim = beside - below.max(above);
     let is_in: mask32x16<S> = beyond_side.max(beyond_rim).max(-low).max(high).simd_le(0.0);
     let rise = out * product(across, *normals) / beside.max(f32::MIN_POSITIVE) + up * along(*normals, axis);

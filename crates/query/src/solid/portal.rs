@@ -82,7 +82,7 @@ impl Solid<'_> {
         let found = Deepest::of_capsule((self.centre, axis * self.half.y), radius, (disc, out))?;
         let (on_disc, height) = (found.on_disc, -found.depth(radius));
         let lowest = on_disc + out * height - self.centre;
-        let is_between = axis.dot(&lowest).abs() <= self.half.y;
+        let is_between = axis.dot(&lowest).abs() <= self.half.y * (1.0 + 1e-12);
         is_between.then_some(Lowest { height, on_disc, is_beside: false, other: height })
     }
 
