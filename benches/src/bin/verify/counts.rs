@@ -22,6 +22,12 @@ pub(crate) struct Arguments {
     run: bool,
 }
 
+/// The ratio of two counts.
+#[expect(clippy::cast_precision_loss, reason = "a ratio for people")]
+fn ratio(count: u64, before: u64) -> f64 {
+    count as f64 / before as f64
+}
+
 /// Returns `true` if no scenario exceeds its count on record by too much, and no vector instruction is
 /// called as a function.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
@@ -40,10 +46,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     };
     let program = std::env::current_exe()?;
     let is_wanted = |name: &str| only.is_empty() || only.iter().any(|wanted| wanted == name);
-    // Counts do not depend on what else runs.
-    let count = |(scenario, name): (Scenario, &str)| {
-        let counted = || counts::count(scenario, &program, &["counts", "--run", name]);
-        is_wanted(name).then(counted).transpose().map_err(|cause| cause.to_string())
+    // Counts depend little on what else runs: opening a file may take a few more. The least of three is
+    // compared with a count on record that is exceeded.
+    let count = |(scenario, name): (Scenario, &str)| -> Result<Option<u64>, String> {
+        let counted = || {
+            let count = counts::count(scenario, &program, &["counts", "--run", name]);
+            count.map_err(|cause| cause.to_string())
+        };
+        let first = is_wanted(name).then(counted).transpose()?;
+        match (first, on_record(name)) {
+            (Some(first), Some(before)) if ratio(first, before) > MOST => {
+                Ok(Some(first.min(counted()?).min(counted()?)))
+            }
+            _ => Ok(first),
+        }
     };
     let counts: Vec<Option<u64>> = Scenario::ALL.into_par_iter().map(count).collect::<Result<_, _>>()?;
     let (mut is_clean, mut new) = (true, String::from("scenario,instructions\n"));
@@ -56,8 +72,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
         let Some(count) = count else { continue };
         match before {
             Some(before) => {
-                #[expect(clippy::cast_precision_loss, reason = "a ratio for people")]
-                let ratio = count as f64 / before as f64;
+                let ratio = ratio(count, before);
                 println!("| {name} | {count} | {before} | {ratio:.3} |");
                 is_clean &= ratio <= MOST;
             }
