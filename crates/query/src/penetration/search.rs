@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use crate::penetration::cover::{Cover, ENOUGH, WayOut, cover};
 use crate::penetration::deepest::climb;
 use crate::penetration::probe::{Deep, Probe, Vector};
-use crate::penetration::survey::{ContactSurvey, KEPT};
+use crate::penetration::survey::{ContactSurvey, KEPT, Surveyed};
 
 /// Bounds of the least shift that separates two things.
 #[derive(Debug, Clone, Copy)]
@@ -81,6 +81,9 @@ const DIRECTIONS: usize = 3 + 2 * KEPT + 7;
 /// The share of the upper bound that the lower one has to reach, however short it is.
 const SHARE: f64 = 0.6;
 
+/// Shifts along the normal of a contact that are tried, in its depth.
+const LONGER: [f64; 3] = [1.0 + GAIN, 1.06, 1.15];
+
 /// Rounds of each refinement.
 const ROUNDS: usize = 8;
 
@@ -115,6 +118,7 @@ impl<P: Probe> Search<'_, P> {
     fn narrow(&mut self) -> ControlFlow<()> {
         self.probe.survey(self.contacts)?;
         self.lower = self.lower.max(self.contacts.least - self.probe.rounding());
+        self.leave_contacts()?;
         self.try_directions()?;
         self.raise()?;
         for _ in 0..ROUNDS {
@@ -171,12 +175,31 @@ impl<P: Probe> Search<'_, P> {
         ControlFlow::Continue(())
     }
 
+    /// Tries shifts that are a little longer than a contact is deep. A longer one along the same normal may
+    /// lead into another part of a hollow thing.
+    fn leave_contacts(&mut self) -> ControlFlow<()> {
+        for i in 0..self.contacts.some.len() {
+            let Surveyed { normals: [way, _], depth, .. } = self.contacts.some[i];
+            for length in LONGER.map(|longer| longer * depth) {
+                if length > 0.0
+                    && length < self.best.length * (1.0 - GAIN)
+                    && self.probe.is_apart(way * length)?
+                {
+                    self.best = Shift { way, length, meets: 0.0 };
+                    self.bisect(GAIN)?;
+                    break;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
     /// Tries the axes of all contacts, their normals, and the axes of the boxes, in both directions.
     fn try_directions(&mut self) -> ControlFlow<()> {
         let mut ways = [Vector::zeros(); DIRECTIONS];
         // The contacts of a small overlap surround it; the axis of their ring crosses it.
         let axes = if self.contacts.count > 0 { self.contacts.axes() } else { [Vector::zeros(); 3] };
-        let found = axes.into_iter().chain(self.contacts.some.iter().flat_map(|(_, normals)| *normals));
+        let found = axes.into_iter().chain(self.contacts.some.iter().flat_map(|contact| contact.normals));
         let ([a, b], boxes) = (self.probe.centres(), self.probe.axes());
         for (way, found) in ways.iter_mut().zip(found.chain([b - a]).chain(boxes.into_iter().flatten())) {
             *way = found;
@@ -321,7 +344,7 @@ impl<P: Probe> Search<'_, P> {
         }
         if self.contacts.count > 0 {
             add(self.contacts.centre());
-            self.contacts.some.iter().for_each(|(place, _)| add(*place));
+            self.contacts.some.iter().for_each(|contact| add(contact.point));
         }
         ControlFlow::Continue((starts, count))
     }

@@ -12,7 +12,7 @@ use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{counts, depth_in, is_inside, nearest_part};
 use crate::penetration::probe::{Deep, Probe, SLACK, Vector, Where};
 use crate::penetration::search::{SearchScratch, search};
-use crate::penetration::survey::ContactSurvey;
+use crate::penetration::survey::{ContactSurvey, Surveyed};
 use crate::solid::answer::{ShapeAnswer, ShapeVerdict};
 use crate::solid::contacts::contacts;
 use crate::solid::core::Solid;
@@ -132,7 +132,9 @@ impl Probe for ShapeProbe<'_, '_> {
         let frame = self.elements.placed.stored_to_world();
         for contact in &self.memory.contacts {
             let normal = Vector::from(frame.rotate_inverse(contact.normal));
-            survey.add(frame.apply_inverse(contact.point).into(), [normal, Vector::zeros()], 0.0);
+            let point = frame.apply_inverse(contact.point).into();
+            let depth = contact.depth / frame.scale();
+            survey.add(Surveyed { point, normals: [normal, Vector::zeros()], depth }, 0.0);
         }
         ControlFlow::Continue(())
     }

@@ -6,6 +6,16 @@ use crate::ask::answer::{Contact, Contacts};
 
 type Vector = Vector3<f64>;
 
+/// A contact in brief.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surveyed {
+    pub(crate) point: Vector,
+    /// The unit normals of both surfaces; 0 if they are not known.
+    pub(crate) normals: [Vector; 2],
+    /// The shift along the first normal that ends the contact; 0 if it is not known.
+    pub(crate) depth: f64,
+}
+
 /// The contacts of two things in brief.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ContactSurvey {
@@ -14,9 +24,8 @@ pub(crate) struct ContactSurvey {
     first: Vector,
     sum: Vector,
     products: [f64; 6],
-    /// The points of some contacts, the first one and others evenly spread over all, and the unit normals of
-    /// both surfaces there.
-    pub(crate) some: Vec<(Vector, [Vector; 2])>,
+    /// Some contacts, the first one and others evenly spread over all.
+    pub(crate) some: Vec<Surveyed>,
     /// One of this many contacts is kept.
     stride: u32,
     /// The greatest shift under which a contact surely stays.
@@ -45,7 +54,9 @@ impl ContactSurvey {
         *self = Self { some, stride: 1, ..Self::default() };
     }
 
-    pub(crate) fn add(&mut self, point: Vector, normals: [Vector; 2], depth: f64) {
+    /// Adds a contact that stays under all shifts shorter than `least`.
+    pub(crate) fn add(&mut self, contact: Surveyed, least: f64) {
+        let point = contact.point;
         if self.count == 0 {
             self.first = point;
         }
@@ -64,17 +75,18 @@ impl ContactSurvey {
                 self.stride *= 2;
             }
             if self.count.is_multiple_of(self.stride) {
-                self.some.push((point, normals));
+                self.some.push(contact);
             }
         }
         self.count += 1;
-        self.least = self.least.max(depth);
+        self.least = self.least.max(least);
     }
 
     /// Adds contacts; `depth` returns the greatest shift under which one stays, from its residual.
     pub(crate) fn add_all(&mut self, contacts: &Contacts, depth: impl Fn(f64) -> f64) {
         for contact in &contacts.contacts {
-            self.add(contact.point.into(), normals(contact), depth(contact.residual));
+            let own = Surveyed { point: contact.point.into(), normals: normals(contact), depth: 0.0 };
+            self.add(own, depth(contact.residual));
         }
     }
 

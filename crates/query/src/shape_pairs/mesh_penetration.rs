@@ -15,7 +15,7 @@ use crate::penetration::answer::Penetration;
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::probe::{Deep, Probe, Vector, Where};
 use crate::penetration::search::{SearchScratch, search};
-use crate::penetration::survey::ContactSurvey;
+use crate::penetration::survey::{ContactSurvey, Surveyed};
 use crate::shape_pairs::mesh_distance::visit_near;
 use crate::solid::core::Solid;
 use crate::solid::overlap::{Overlap, enough, overlap};
@@ -178,7 +178,7 @@ impl Probe for ShapeMeshProbe<'_> {
             let normal = normal.try_normalize(0.0).unwrap_or(zero);
             let out = probe.out_of(corners, zero, survey.least);
             let (way, depth) = out.map_or((zero, 0.0), |out| (out.way, out.lower));
-            survey.add(place, [way, normal], depth);
+            survey.add(Surveyed { point: place, normals: [way, normal], depth }, depth);
             ControlFlow::Continue(())
         })
     }

@@ -280,6 +280,21 @@ fn shapes_in_a_solid() {
     assert_eq!(ask(0.3, HOLLOW).upper, 0.0, "inside, it touches nothing");
     let inwards = ask(0.8, HOLLOW);
     assert!((inwards.upper - 0.1).abs() < 0.04 && inwards.direction[0] < -0.98, "{inwards:?}");
+    // Large ones nearly fill the ball, so the way back into it is of little more than one length.
+    let rng = &mut rng(8804);
+    for _ in 0..100 {
+        let (out, radius) = (Vector::from(unit_vector(rng)), rng.random_range(0.5..0.88));
+        let away = rng.random_range(1.05 - radius..0.9);
+        let shape = Shape::Sphere { centre: (out * away).into(), radius };
+        let found = target.penetration(&shape, HOLLOW, &Budget::UNLIMITED, &mut Scratch::default());
+        let exact = (away + radius - 1.0).min(1.0 + radius - away);
+        assert!(found.lower <= exact + 0.04, "{exact}: {found:?} of {shape:?}");
+        assert!((found.upper - exact).abs() < 0.04, "{exact}: {found:?} of {shape:?}");
+    }
+    let mut ask = |x: f64, interior| {
+        let shape = Shape::Sphere { centre: [x, 0.0, 0.0], radius: 0.3 };
+        target.penetration(&shape, interior, &Budget::UNLIMITED, scratch)
+    };
     assert_eq!(ask(1.4, SOLID).upper, 0.0);
     assert_eq!(ask(f64::NAN, SOLID).upper, f64::INFINITY);
 }

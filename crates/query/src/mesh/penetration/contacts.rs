@@ -9,7 +9,7 @@ use nearmiss_mesh::triangle_contact;
 
 use crate::mesh::mesh_pair::MeshPairing;
 use crate::mesh::penetration::triangle_depth::triangle_depth;
-use crate::penetration::survey::ContactSurvey;
+use crate::penetration::survey::{ContactSurvey, Surveyed};
 
 type Vector = Vector3<f64>;
 
@@ -32,7 +32,8 @@ impl PairVisitor for Gathering<'_, '_> {
             let pose = self.pair.meshes[0].pose();
             let normals = contact.normals.map(|n| n.map_or(Vector::zeros(), |n| pose.rotate(n).into()));
             let depth = triangle_depth(&a, &b).0 * pose.scale();
-            self.survey.add(pose.apply(contact.point).into(), normals, depth);
+            let point = pose.apply(contact.point).into();
+            self.survey.add(Surveyed { point, normals, depth: 0.0 }, depth);
         }
         self.pair.meter.go_on()
     }

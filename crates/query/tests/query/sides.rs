@@ -1,0 +1,104 @@
+//! The direction in which contacts move a shape out: of balls inside it, and on which side of surfaces.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_query::{
+    CollideOptions, Placed, Scratch, Semantics, Shape, ShapeContact, ShapeHint, ShapePlan, Target,
+};
+use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
+
+type Vector = Vector3<f64>;
+
+/// Scans sheets of 2 × 2, given by the two directions along each from the middle of its lower edge, with a
+/// spacing of 0.05.
+fn sheets(of: &[[Vector; 2]]) -> PointHierarchy {
+    let steps = |n: u32| (0..=n).map(|i| 0.05 * f64::from(i));
+    let points: Vec<[f64; 3]> = of
+        .iter()
+        .flat_map(|[side, up]| {
+            steps(40).flat_map(move |a| steps(40).map(move |b| (side * (a - 1.0) + up * b).into()))
+        })
+        .collect();
+    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+/// Asks for contacts with a hint at one place after the other.
+fn follow(scan: &PointHierarchy, radius: f64, centres: &[[f64; 3]]) -> Vec<Vec<ShapeContact>> {
+    let plan = ShapePlan::new(&CollideOptions::default(), scan).unwrap();
+    let target = Target::new(Placed::new(scan, &Pose::IDENTITY), &plan);
+    let (mut hint, mut scratch) = (ShapeHint::default(), Scratch::default());
+    let contacts = centres.iter().map(|&centre| {
+        let mut contacts = Vec::new();
+        target.contacts_hinted(&Shape::Sphere { centre, radius }, &mut hint, &mut contacts, &mut scratch);
+        contacts
+    });
+    contacts.collect()
+}
+
+/// A ball that touched one side of a groove stays inside the groove when it touches the other one.
+#[test]
+fn a_contact_does_not_decide_about_another_sheet() {
+    for half_angle in [30.0_f64, 45.0, 60.0] {
+        let (sin, cos) = half_angle.to_radians().sin_cos();
+        let (left, right) = (Vector::new(-sin, 0.0, cos), Vector::new(sin, 0.0, cos));
+        let scan = sheets(&[[Vector::y(), left], [Vector::y(), right]]);
+        // Both sides are `radius` away from the middle.
+        let radius = 0.1;
+        let at = |x: f64| [x / cos, 0.0, radius / sin];
+        let found = follow(&scan, radius, &[at(-0.02), at(0.02), at(-0.02)]);
+        for (contacts, side) in found.iter().zip([1.0, -1.0, 1.0]) {
+            let inwards = Vector::new(side * cos, 0.0, sin);
+            let deepest = contacts.first().unwrap_or_else(|| panic!("no contact, {half_angle}° {side}"));
+            let along = Vector::from(deepest.normal).dot(&inwards);
+            assert!(along > 0.9 && (deepest.depth - 0.02).abs() < 0.02, "{half_angle}° {side}: {deepest:?}");
+        }
+    }
+}
+
+/// A ball whose centre sinks below the floor is still pushed up, also while it touches a wall.
+#[test]
+fn a_contact_with_a_wall_leaves_the_floor_its_side() {
+    let scan = sheets(&[[Vector::y(), Vector::x()], [Vector::y(), Vector::z()]]);
+    let found = follow(&scan, 0.2, &[[0.19, 0.0, 0.19], [0.19, 0.0, 0.1], [0.19, 0.0, -0.001]]);
+    for (contacts, depth) in found.iter().zip([0.01, 0.1, 0.201]) {
+        let along = |k: usize| {
+            let found = contacts.iter().filter(|contact| contact.normal[k] > 0.9);
+            found.map(|contact| contact.depth).fold(f64::NEG_INFINITY, f64::max)
+        };
+        assert!((along(2) - depth).abs() < 0.01, "{depth} in the floor: {contacts:?}");
+        assert!(along(0) > 0.0, "in the wall: {contacts:?}");
+    }
+}
+
+/// Moved by the depth of a contact with a ball that is inside its core, a shape is out of the ball.
+#[test]
+fn contacts_with_balls_inside_a_shape_lead_out() {
+    let scan = sheets(&[[Vector::y(), Vector::x()]]);
+    let rng = &mut rng(8102);
+    let ball = 0.02;
+    let options = CollideOptions::default().with_semantics(Semantics::Thickened(ball));
+    let plan = ShapePlan::new(&options, &scan).unwrap();
+    let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+    let (mut scratch, mut contacts, mut inside) = (Scratch::default(), Vec::new(), 0);
+    for round in 0..600 {
+        let [x, y, z] = point_in(rng, 0.2);
+        let pose = rotation(rng).with_translation([1.0 + x, y, z]);
+        let shape = match round % 3 {
+            0 => Shape::Box { pose, half: [0.3, 0.2, 0.1], radius: 0.0 },
+            1 => Shape::Cylinder { pose, half_height: 0.2, radius: 0.15, rounding: 0.0 },
+            _ => Shape::Cone { pose, half_height: 0.3, radius: 0.2, rounding: 0.02 },
+        };
+        target.contacts(&shape, &mut contacts, &mut scratch);
+        for contact in &contacts {
+            let normal = Vector::from(contact.normal);
+            let centre: [f64; 3] = (Vector::from(contact.point) - normal * ball).into();
+            let of_ball = Shape::Sphere { centre, radius: 0.0 };
+            inside += usize::from(shape.gap_to(&of_ball).unwrap().upper == 0.0);
+            let moved = shape.moved(&Pose::from_translation((normal * contact.depth).into())).unwrap();
+            let left = moved.gap_to(&of_ball).unwrap().upper;
+            assert!(left >= ball - 1e-9, "round {round}: {left} left of {contact:?} of {shape:?}");
+        }
+    }
+    assert!(inside > 1000, "{inside} centres inside");
+}
