@@ -25,16 +25,16 @@ pub enum MotionError {
          keep the size of an object"
     )]
     Scale {
-        /// Index of the pose with another scale than the one before.
+        /// Index of the pose with another scale than the first.
         index: usize,
-        /// The scale of the pose before.
+        /// The scale of the first pose.
         from: f64,
         /// The scale of this pose.
         to: f64,
     },
 }
 
-/// Greatest relative change of scale between two poses that counts as rounding.
+/// Greatest relative difference of the scales of two poses that counts as rounding.
 const SAME_SCALE: f64 = 1e-6;
 
 /// Rotation angles below this, in radians, are treated by power series.
@@ -160,23 +160,28 @@ impl Motion {
     /// object turns the shorter way, by at most half a turn; give more poses for more. One pose
     /// gives a motion that stays there.
     ///
+    /// The scale of all poses is that of the first. A relative difference of up to 1e-6 counts as
+    /// rounding and is ignored.
+    ///
     /// # Errors
     /// Fails without poses, for numbers that are not finite, and if the scale changes by more than
-    /// rounding (1e-6).
+    /// rounding.
     pub fn through(poses: &[Pose]) -> Result<Self, MotionError> {
         let end = *poses.last().ok_or(MotionError::Empty)?;
         let is_finite = |pose: &Pose| pose.to_row_major().iter().all(|x| x.is_finite());
         if let Some(index) = poses.iter().position(|pose| !is_finite(pose)) {
             return Err(MotionError::NotFinite { index });
         }
-        for (index, pair) in (1..).zip(poses.windows(2)) {
-            let (from, to) = (pair[0].scale(), pair[1].scale());
+        let from = poses.first().map_or(1.0, Pose::scale);
+        for (index, pose) in poses.iter().enumerate() {
+            let to = pose.scale();
             if (to - from).abs() > SAME_SCALE * from {
                 return Err(MotionError::Scale { index, from, to });
             }
         }
-        let screws = poses.windows(2).map(|pair| Screw::from_to(&pair[0], &pair[1])).collect();
-        Ok(Self { screws, end })
+        let between = |pair: &[Pose]| Screw::from_to(&pair[0].with_scale(from), &pair[1]);
+        let screws = poses.windows(2).map(between).collect();
+        Ok(Self { screws, end: end.with_scale(from) })
     }
 
     /// Returns the duration: the number of screws.
@@ -328,6 +333,12 @@ mod tests {
         let grown = Pose::IDENTITY.with_scale(2.0);
         let refused = Motion::through(&[Pose::IDENTITY, Pose::IDENTITY, grown]);
         assert_eq!(refused, Err(MotionError::Scale { index: 2, from: 1.0, to: 2.0 }));
-        assert!(Motion::through(&[Pose::IDENTITY, Pose::IDENTITY.with_scale(1.0 + 1e-7)]).is_ok());
+        // Rounding of the scale does not accumulate along a motion.
+        let nearly = Motion::through(&[Pose::IDENTITY, Pose::IDENTITY.with_scale(1.0 + 1e-7)]).unwrap();
+        assert_eq!([0.0, 0.5, 1.0].map(|time| nearly.at(time).scale()), [1.0; 3]);
+        let drifts: Vec<Pose> =
+            (0..20).map(|k| Pose::IDENTITY.with_scale(1.0 + 1e-7 * f64::from(k))).collect();
+        let refused = MotionError::Scale { index: 11, from: 1.0, to: drifts[11].scale() };
+        assert_eq!(Motion::through(&drifts), Err(refused));
     }
 }

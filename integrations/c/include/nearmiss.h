@@ -1960,8 +1960,8 @@ NearmissStatus nearmiss_world_penetration(const struct NearmissWorld *world,
 /*
  Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`,
  which may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot.
- `lower` is a bound for all pairs that count. If none does, both ids are `UINT64_MAX`. Thread safety: one
- call at a time for each scratch.
+ `lower` is at most `reach`, and a bound for all pairs that count. If none does, both ids are `UINT64_MAX`.
+ Thread safety: one call at a time for each scratch.
 
  # Safety
  `ignored` are `ignored_count` pairs; other pointers are null or valid.

@@ -2,8 +2,9 @@
 
 use nearmiss_geometry::Aabb;
 
+use crate::ask::options::Semantics;
 use crate::distance::DistancePlan;
-use crate::many::body::BodyDistance;
+use crate::many::body::{BodyDistance, PlacedBody};
 use crate::many::world::{Bodies, BodyId, World};
 use crate::mesh::prepared::PreparedMesh;
 use crate::pair::prepared::Prepared;
@@ -17,7 +18,8 @@ pub struct NearestPair {
     pub ids: [BodyId; 2],
     /// A point of each of them, [`Self::upper`] apart.
     pub points: [[f64; 3]; 2],
-    /// A proven lower bound of the distance of any two bodies that count.
+    /// A proven lower bound of the distance of any two bodies that count, at most `reach`: pairs that are
+    /// further apart may not have been compared.
     pub lower: f64,
     /// The distance of these two bodies, from above: no other pair was found nearer.
     pub upper: f64,
@@ -25,8 +27,9 @@ pub struct NearestPair {
 
 impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
     /// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within
-    /// `reach`, which may be infinite. `counts` leaves pairs out, such as neighbouring links of a robot.
-    /// `None` if no pair counts.
+    /// `reach`, which may be infinite. The boxes of scans include the balls of
+    /// [`Semantics::Thickened`]. `counts` leaves pairs out, such as neighbouring links of a robot. `None` if
+    /// no pair counts.
     ///
     /// Pairs are compared in the order of the gaps between their boxes, until a gap exceeds the least
     /// distance. Pairs with an invalid pose or shape are left out, as their distance is unknown. `plan` is
@@ -62,10 +65,21 @@ impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
         plan: &DistancePlan,
         scratch: &mut Scratch,
     ) -> Option<NearestPair> {
+        let radius = match plan.options().semantics {
+            Semantics::Thickened(radius) => radius,
+            Semantics::Obstacle | Semantics::Surface => 0.0,
+        };
+        // The boxes of the broad phase are those of the points.
+        let thickness = |pair: [BodyId; 2]| -> f64 {
+            pair.map(|id| if let Some(PlacedBody::Scan(_)) = self.body(id) { radius } else { 0.0 })
+                .iter()
+                .sum()
+        };
         let mut pairs = Vec::new();
-        self.near_pairs_by(bodies, reach, |a, b| counts(a, b).then_some(reach), &mut pairs);
-        let mut pairs: Vec<(f64, [BodyId; 2])> =
-            pairs.into_iter().map(|pair| (self.gap(pair), pair)).collect();
+        let reach_of = |a, b| counts(a, b).then(|| reach + thickness([a, b]));
+        self.near_pairs_by(bodies, reach + 2.0 * radius, reach_of, &mut pairs);
+        let gap_of = |pair: [BodyId; 2]| ((self.gap(pair) - thickness(pair)).max(0.0), pair);
+        let mut pairs: Vec<(f64, [BodyId; 2])> = pairs.into_iter().map(gap_of).collect();
         pairs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut best: Option<NearestPair> = None;
         for (gap, ids) in pairs {
@@ -80,7 +94,7 @@ impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
                 _ => NearestPair { ids, points, lower, upper },
             });
         }
-        best
+        best.map(|best| NearestPair { lower: best.lower.min(reach), ..best })
     }
 
     /// Returns the distance of the bounding boxes of two bodies: a lower bound of theirs. 0 for bodies

@@ -8,7 +8,6 @@ use crate::many::body::BodyPair;
 use crate::mesh::answer::MeshVerdict;
 use crate::mesh::pair::MeshPair;
 use crate::mesh_scan::plan::MeshScanPlan;
-use crate::pair::placed_balls::is_proper;
 use crate::question::Scratch;
 use crate::solid::answer::ShapeVerdict;
 use crate::solid::plan::ShapePlan;
@@ -135,14 +134,22 @@ impl BodyPair<'_> {
                 let evidence = Evidence::Certified;
                 match pair.distance(margin, scratch) {
                     Some(found) => BodyAnswer::exact((found.lower, found.upper), found.points, margin),
-                    None if !is_proper(pair.mesh().stored_to_world()) => BodyAnswer::invalid(Reason::Pose),
-                    None if pair.shape().bounds().is_none() => BodyAnswer::invalid(Reason::Shape),
-                    None => BodyAnswer { verdict: BodyVerdict::Separated { evidence }, band: 0.0 },
+                    None => match pair.shape().refused_in(pair.mesh().stored_to_world()) {
+                        Some(reason) => BodyAnswer::invalid(reason),
+                        None => BodyAnswer { verdict: BodyVerdict::Separated { evidence }, band: 0.0 },
+                    },
                 }
             }
-            Self::Shapes(pair) => pair.distance().map_or(BodyAnswer::invalid(Reason::Shape), |found| {
-                BodyAnswer::exact((found.lower, found.upper), found.points, margin)
-            }),
+            Self::Shapes(pair) => {
+                let [a, b] = pair.shapes();
+                match pair.distance() {
+                    Some(found) => BodyAnswer::exact((found.lower, found.upper), found.points, margin),
+                    None => {
+                        let reason = a.refused_in(b.pose()).or_else(|| b.refused_in(a.pose()));
+                        BodyAnswer::invalid(reason.unwrap_or(Reason::Shape))
+                    }
+                }
+            }
         }
     }
 }

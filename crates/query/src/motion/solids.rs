@@ -8,6 +8,7 @@ use nearmiss_geometry::{Aabb, Motion, Pose, Screw};
 
 use crate::motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepReason};
 use crate::pair::placed::ViewScratch;
+use crate::pair::placed_balls::is_proper;
 use crate::solid::answer::{ShapeContact, ShapeDistance};
 use crate::solid::contacts::{Candidates, contacts};
 use crate::solid::core::Solid;
@@ -33,8 +34,11 @@ const HALVINGS: u32 = 10;
 /// Distance queries after which the search for a contact ends.
 const MOST: u32 = 100_000;
 
-/// More than the rounding of a pose along a motion and of a speed.
+/// More than the relative rounding of a speed and of a distance.
 const ROUNDING: f64 = 1e-9;
+
+/// More than the rounding of a place that is moved by a pose along a motion, relative to its coordinates.
+const ROUNDING_OF_PLACES: f64 = 1e-14;
 
 /// The memory of a sweep.
 pub(crate) type Working<'a> = (Level, &'a mut ViewScratch, &'a mut Candidates, &'a mut Vec<ShapeContact>);
@@ -61,17 +65,16 @@ pub(crate) fn sweep(
     (level, scratch, candidates, found): Working<'_>,
 ) -> ShapeSweep {
     let clearance = elements.margin * elements.scale();
-    let undecided = |reason| ShapeSweepVerdict::Undecided { t_free: 0.0, reason };
     let Some(Aabb { min, max }) = shape.bounds() else {
-        return ShapeSweep { verdict: undecided(SweepReason::Shape), distances: 0 };
+        let verdict = ShapeSweepVerdict::Undecided { t_free: 0.0, reason: SweepReason::Shape };
+        return ShapeSweep { verdict, distances: 0 };
     };
     let (min, max) = (Vector::from(min), Vector::from(max));
     let ball = (0.5 * (min + max), 0.5 * (max - min).norm());
     let mut course = Course { elements, shape, motion, ball, clearance, level, scratch, distances: 0 };
     let verdict = match course.run() {
-        Err(reason) => undecided(reason),
-        Ok(Outcome::Told(verdict)) => verdict,
-        Ok(Outcome::Hit { t_free, apart, t_hit }) => {
+        Outcome::Told(verdict) => verdict,
+        Outcome::Hit { t_free, apart, t_hit } => {
             let t_hit = course.first_touch(apart, t_hit);
             let (moved, frame) = course.placed(t_hit);
             let solid = Solid::new(&moved, &frame);
@@ -125,14 +128,24 @@ impl<'s> Course<'s, '_> {
         }
     }
 
-    /// Bounds the distance at a time.
+    /// Bounds the distance at a time, rounding included.
     fn at(&mut self, time: f64) -> Result<ShapeDistance, SweepReason> {
+        let at = self.motion.at(time);
+        if !is_proper(&at) {
+            return Err(SweepReason::Pose);
+        }
         let (moved, frame) = self.placed(time);
         let solid = Solid::new(&moved, &frame).ok_or(SweepReason::Shape)?;
         self.distances += 1;
         // Without any disc or ball, nothing is known.
         let working = (self.level, &mut self.scratch.corners);
-        distance(self.elements, Some(&solid), f64::INFINITY, working).ok_or(SweepReason::Near)
+        let found = distance(self.elements, Some(&solid), f64::INFINITY, working).ok_or(SweepReason::Near)?;
+        let own = at.scale() * (self.ball.0.norm() + self.ball.1);
+        let far = Vector::from(at.translation()).norm()
+            + Vector::from(self.elements.placed.stored_to_world().translation()).norm()
+            + own;
+        let lower = found.lower * (1.0 - ROUNDING) - ROUNDING_OF_PLACES * far;
+        Ok(ShapeDistance { lower: lower.max(0.0), ..found })
     }
 
     /// A bound on the speed of any point of the shape: along a screw each has a constant speed.
@@ -143,7 +156,7 @@ impl<'s> Course<'s, '_> {
         (Vector::from(screw.velocity(centre)).norm() + turn * self.ball.1 * start.scale()) * (1.0 + ROUNDING)
     }
 
-    fn run(&mut self) -> Result<Outcome, SweepReason> {
+    fn run(&mut self) -> Outcome {
         let duration = self.motion.duration();
         let (mut time, mut apart) = (0.0, 0.0);
         // The time up to which the motion is proven free, and `true` while the proof goes on.
@@ -153,10 +166,16 @@ impl<'s> Course<'s, '_> {
         let mut last: Option<(f64, f64)> = None;
         let mut reason = SweepReason::Near;
         loop {
-            let found = self.at(time)?;
-            let left = found.lower * (1.0 - ROUNDING) - self.clearance;
+            let found = match self.at(time) {
+                Ok(found) => found,
+                Err(reason) => {
+                    let verdict = ShapeSweepVerdict::Undecided { t_free: proven.min(time), reason };
+                    return Outcome::Told(verdict);
+                }
+            };
+            let left = found.lower - self.clearance;
             if found.upper <= self.clearance {
-                return Ok(Outcome::Hit { t_free: proven.min(time), apart, t_hit: time });
+                return Outcome::Hit { t_free: proven.min(time), apart, t_hit: time };
             }
             if found.upper < least {
                 (least, at) = (found.upper, time);
@@ -188,11 +207,11 @@ impl<'s> Course<'s, '_> {
             time = if next > time && next < end { next } else { end };
             last = Some((found.lower, speed * (time - apart)));
         }
-        Ok(Outcome::Told(if goes_on {
+        Outcome::Told(if goes_on {
             ShapeSweepVerdict::Free { clearance: kept.max(self.clearance), upper: least, at }
         } else {
             ShapeSweepVerdict::Undecided { t_free: proven, reason }
-        }))
+        })
     }
 
     /// The first time between two at which a contact is found, by halving.

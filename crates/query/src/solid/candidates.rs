@@ -11,8 +11,9 @@ use nearmiss_lanes::wide::{Bits, bits, seen_from, squared};
 
 const WIDTH: usize = LeafBlock::WIDTH;
 
-/// The candidates among sixteen consecutive points.
+/// The candidates among sixteen consecutive points. Each row of numbers is in one line of the cache.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub(crate) struct CandidateBlock {
     /// The centres of the discs and balls, in the stored frame.
     pub(crate) centres: [[f32; WIDTH]; 3],

@@ -77,8 +77,11 @@ pub(crate) fn crossings(
     found.clear();
     let bounds = elements.arrays.tree.root_box();
     let centre = Vector::from(bounds.centre.map(f64::from));
-    // Boxes contain discs and balls; the obstacle exceeds them by at most a local radius.
-    let size = f64::from(bounds.radius() + bounds.reach) + elements.beyond_boxes() + ray.radius;
+    // Of a ball about the discs and balls, and of one about all enclosures.
+    let enclosure = elements.arrays.tree.enclosure(elements.part(), NodeId::ROOT);
+    let around = Vector::from(enclosure.centre.map(f64::from)) - centre;
+    let size = f64::from(bounds.radius() + bounds.reach).max(around.norm() + f64::from(enclosure.radius()));
+    let size = size + elements.beyond_boxes() + ray.radius;
     let middle = (centre - ray.origin).dot(&ray.direction);
     let off = (centre - ray.at(middle)).norm();
     if off.is_nan() || off > size * 1.001 || middle + size < 0.0 || middle - size * 1.001 > ray.max {

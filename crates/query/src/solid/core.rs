@@ -6,6 +6,7 @@ use nearmiss_mesh::nearest_on_triangle;
 
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::closest::{Closest, closest};
+use crate::solid::extents::{extreme, frame, frame_of_triangle, spanned, upright_box};
 use crate::solid::inner::inner_depth;
 use crate::solid::plane::Plane;
 use crate::solid::shape::{Shape, SupportMap};
@@ -120,11 +121,7 @@ impl<'a> Solid<'a> {
             }
             Shape::Triangle { points, .. } => {
                 let corners = points.map(into);
-                let along = (corners[1] - corners[0]).try_normalize(0.0).unwrap_or_else(Vector::x);
-                let other = corners[2] - corners[0];
-                let across = (other - along * along.dot(&other)).try_normalize(0.0);
-                let across = across.unwrap_or_else(|| frame(along)[1]);
-                let axes = [along, across, along.cross(&across)];
+                let axes = frame_of_triangle(&corners);
                 let own = corners.map(Into::into);
                 let (centre, half) = spanned(&axes, |d| extreme(&own, d));
                 (Core::Triangle(corners), centre, axes, half)
@@ -307,14 +304,18 @@ impl<'a> Solid<'a> {
         Self { core, centre: self.centre + t, inside: self.inside + t, ..*self }
     }
 
+    /// More than the rounding error of a point of the core that is nearest to `x`, if `x` is in the core.
+    pub(crate) fn rounding(&self, x: &Vector) -> f64 {
+        1e-12 * (self.half.norm() + self.radius) + 4e-16 * x.amax()
+    }
+
     /// The depth of `x` in the shape: a lower bound of its distance from the boundary, and the direction away
     /// from there. `None` if it is outside.
     pub(crate) fn depth(&self, x: &Vector) -> Option<(f64, Vector)> {
         let on_core = self.nearest(x);
         let away = x - on_core;
         let distance = away.norm();
-        // On the core, up to rounding.
-        if distance > 1e-12 * (self.half.norm() + self.radius) + 4e-16 * x.amax() {
+        if distance > self.rounding(x) {
             return (distance < self.radius).then(|| (self.radius - distance, -away / distance));
         }
         let (depth, out) = match self.core {
@@ -438,40 +439,6 @@ impl<'a> Solid<'a> {
         let Closest { points, distance, lower } = closest(support, start, ends);
         Closest { points: points.map(|p| p + centre), distance, lower }.into()
     }
-}
-
-/// An orthonormal frame whose first axis is `along`.
-fn frame(along: Vector) -> [Vector; 3] {
-    let least = along.iamin();
-    let other = Vector::from_fn(|k, _| if k == least { 1.0 } else { 0.0 });
-    let across = along.cross(&other).normalize();
-    [along, across, along.cross(&across)]
-}
-
-/// The first of the points that are furthest along `d`.
-fn extreme(points: &[[f64; 3]], d: &Vector) -> Vector {
-    let (mut most, mut first) = (f64::NEG_INFINITY, 0);
-    for (i, p) in points.iter().enumerate() {
-        let own = p[0] * d.x + p[1] * d.y + p[2] * d.z;
-        if own > most {
-            (most, first) = (own, i);
-        }
-    }
-    points.get(first).map_or_else(Vector::zeros, |&p| p.into())
-}
-
-/// The centre and half the edge lengths of the upright box about points.
-fn upright_box(points: impl Iterator<Item = Vector>) -> (Vector, Vector) {
-    let none = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
-    let (low, high) = points.fold(none, |(low, high), p| (low.inf(&p), high.sup(&p)));
-    (0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low)
-}
-
-/// The centre and half the edge lengths of a box along `axes` about a shape with this support map.
-fn spanned(axes: &[Vector; 3], support: impl Fn(&Vector) -> Vector) -> (Vector, Vector) {
-    let ends = axes.map(|axis| [-axis, axis].map(|d| axis.dot(&support(&d))));
-    let centre = (0..3).map(|k| axes[k] * (0.5 * ends[k][0] + 0.5 * ends[k][1])).sum();
-    (centre, Vector::from(ends.map(|[low, high]| 0.5 * high - 0.5 * low)))
 }
 
 /// The point nearest to `p` of the section of a truncated cone: (distance from the axis, height).

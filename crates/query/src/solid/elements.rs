@@ -298,7 +298,7 @@ impl<'a> Elements<'a> {
         let element = self.element(i);
         let Element::Disc(disc) = element else {
             let (gap, _) = element.gap(solid, self.margin);
-            return if gap.distance > solid.radius + self.margin { None } else { Some(gap.on_disc) };
+            return (gap.distance <= solid.radius + self.margin).then_some(gap.on_disc);
         };
         solid.reaches(&disc, solid.radius + self.margin.max(disc.thickness()))
     }

@@ -138,9 +138,10 @@ fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<Gap> {
 /// the inside of the shape.
 fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Option<Place> {
     let way = gap.on_core - centre;
-    let normal = way.try_normalize(0.0).or_else(|| (solid.inside - centre).try_normalize(0.0));
+    let is_in = way.norm() <= solid.rounding(&centre);
+    let normal = if is_in { solid.inside - centre } else { way }.try_normalize(0.0);
     let normal = normal.unwrap_or_else(Vector::z);
-    let inside = if way == Vector::zeros() { -normal.dot(&(solid.support(&-normal) - centre)) } else { 0.0 };
+    let inside = if is_in { -normal.dot(&(solid.support(&-normal) - centre)) } else { 0.0 };
     let depth = solid.radius + radius - way.norm() + inside;
     Some(Place { point: centre + normal * radius, normal, depth }).filter(|it| it.depth.is_finite())
 }

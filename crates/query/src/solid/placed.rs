@@ -3,6 +3,7 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Aabb, Pose};
 
+use crate::ask::answer::Reason;
 use crate::pair::placed_balls::{is_proper, relative_pose};
 use crate::solid::core::Solid;
 use crate::solid::shape::Shape;
@@ -82,5 +83,11 @@ impl<'a> PlacedShape<'a> {
     /// differ too much.
     pub(crate) fn frame_of(&self, frame: &Pose) -> Option<Pose> {
         relative_pose([&self.pose, frame])
+    }
+
+    /// The reason why questions about the shape in another frame have no answer; `None` if they have one.
+    pub(crate) fn refused_in(&self, frame: &Pose) -> Option<Reason> {
+        let Some(frame) = self.frame_of(frame) else { return Some(Reason::Pose) };
+        Solid::new(&self.shape, &frame).is_none().then_some(Reason::Shape)
     }
 }

@@ -17,7 +17,7 @@ impl Solid<'_> {
             ControlFlow::Break(found) => found,
             ControlFlow::Continue(()) => {
                 let gap = self.gap_within(disc, within);
-                if gap.distance > within { None } else { Some(gap.on_disc) }
+                (gap.distance <= within).then_some(gap.on_disc)
             }
         }
     }

@@ -153,12 +153,12 @@ impl Shape<'_> {
         let rounding = self.rounding();
         match *self {
             Self::Box { pose, half: [x, y, z], .. } => {
-                let scale = pose.scale();
+                let scale = scale_of(&pose);
                 [x * scale, y * scale, z * scale, rounding]
             }
             Self::Cylinder { pose, half_height, radius, .. }
             | Self::Cone { pose, half_height, radius, .. } => {
-                let scale = pose.scale();
+                let scale = scale_of(&pose);
                 [half_height * scale, radius * scale, 0.0, rounding]
             }
             Self::Hull { points: [], .. } => [f64::NAN; 4],
@@ -177,16 +177,16 @@ impl Shape<'_> {
                 let [centre, along] = [1.0, -1.0].map(|sign| [0, 1, 2].map(|k| 0.5 * (p[k] + sign * q[k])));
                 (centre, length(along), [0.0; 3])
             }
-            Self::Box { pose, half, .. } => (pose.translation(), pose.scale() * length(half), half),
+            Self::Box { pose, half, .. } => (pose.translation(), scale_of(&pose) * length(half), half),
             Self::Cylinder { pose, half_height, radius, .. }
             | Self::Cone { pose, half_height, radius, .. } => {
                 let half = [radius, half_height, 0.0];
-                (pose.translation(), pose.scale() * length(half), half)
+                (pose.translation(), scale_of(&pose) * length(half), half)
             }
             Self::Triangle { .. } | Self::Hull { .. } | Self::Own { .. } => return None,
         };
         let rounding = self.rounding();
-        let is_proper = rounding >= 0.0 && lengths.iter().all(|&l| l >= 0.0);
+        let is_proper = rounding >= 0.0 && beyond >= 0.0 && lengths.iter().all(|&l| l >= 0.0);
         is_proper.then_some((centre, [rounding, beyond]))
     }
 
@@ -209,13 +209,13 @@ impl Shape<'_> {
         !zero.is_nan() && lengths.iter().all(|&l| l >= 0.0 && l.is_finite())
     }
 
-    /// A bounding box of the shape in the world, rounding included; `None` if a length is negative or
-    /// NaN, or a hull has no points.
+    /// A bounding box of the shape in the world, rounding included. `None` if the shape is invalid: a length
+    /// is negative, a length or a coordinate is not finite, or a hull has no points.
     #[must_use]
     pub fn bounds(&self) -> Option<Aabb> {
         /// Relative rounding error of a corner's coordinates in double precision.
         const ROUNDING: f64 = 4e-15;
-        if !self.lengths().iter().all(|&l| l >= 0.0) {
+        if !self.is_valid() {
             return None;
         }
         let (low, high) = match *self {
@@ -240,6 +240,12 @@ impl Shape<'_> {
         let (min, max) = ([0, 1, 2].map(|k| low[k] - more[k]), [0, 1, 2].map(|k| high[k] + more[k]));
         Some(Aabb { min, max })
     }
+}
+
+/// The scale of a pose; NaN if its rotation is not finite.
+#[inline]
+fn scale_of(pose: &Pose) -> f64 {
+    pose.scale() + 0.0 * pose.rotation().sum()
 }
 
 fn hull_of(points: impl Iterator<Item = [f64; 3]>) -> ([f64; 3], [f64; 3]) {

@@ -8,8 +8,12 @@ use crate::solid::hint::{MOST, ShapeHint};
 
 type Vector = Vector3<f64>;
 
-/// A contact of the last frame within this distance decides the side, in local radii.
+/// A contact of the last frame within this distance may decide the side, in local radii.
 const REACH: f64 = 4.0;
+
+/// The least cosine of the normals of a disc and of a contact of the last frame that decides about it. A
+/// contact with a wall tells nothing about the floor.
+const SAME: f64 = 0.7;
 
 /// The rules for the direction in which a shape moves out of a disc: the scan if it is oriented, then a
 /// contact of the last frame, then a point of the shape. In the stored frame.
@@ -45,20 +49,20 @@ impl Sides {
     /// shape is behind the disc. `band` is the local radius.
     pub(crate) fn of(&self, disc: &FlatDisc, band: f64) -> (f64, bool) {
         let height = disc.normal.dot(&(self.inside - disc.centre));
-        let sign = if self.is_oriented {
-            1.0
-        } else {
-            let decisive = self.known(disc, band).unwrap_or(height);
-            1.0_f64.copysign(decisive)
-        };
-        (sign, sign * height < 0.0)
+        if self.is_oriented {
+            return (1.0, height < 0.0);
+        }
+        // A contact keeps the shape on its side, so the disc still is before it.
+        (1.0_f64.copysign(self.known(disc, band).unwrap_or(height)), false)
     }
 
-    /// The cosine of the normals of a disc and of the nearest contact of the last frame, if that is near.
+    /// The cosine of the normals of a disc and of the nearest contact of the last frame with a similar
+    /// normal, if that is near.
     fn known(&self, disc: &FlatDisc, band: f64) -> Option<f64> {
+        let cosine = |known: &&(Vector, Vector)| known.1.dot(&disc.normal);
         let away = |known: &(Vector, Vector)| (known.0 - disc.centre).norm_squared();
-        let nearest = self.known[..self.count].iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        let along = nearest.1.dot(&disc.normal);
-        (away(nearest) <= (REACH * band).powi(2) && along != 0.0).then_some(along)
+        let similar = self.known[..self.count].iter().filter(|known| cosine(known).abs() >= SAME);
+        let nearest = similar.min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        (away(nearest) <= (REACH * band).powi(2)).then(|| cosine(&nearest))
     }
 }

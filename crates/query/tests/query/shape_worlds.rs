@@ -8,7 +8,7 @@ use nearmiss_hierarchy::{BuildOptions, MeshHierarchy, PointHierarchy};
 use nearmiss_query::{
     AsShape, Bodies, Body, BodyId, BodyInterior, BodyPair, BodyVerdict, Budget, CollideOptions, CollidePlan,
     DistanceOptions, DistancePlan, Interior, MeshSolid, PlacedBody, PlacedShape, Prepared, PreparedMesh,
-    Reason, Scratch, Shape, ShapePlan, ShapeScanPair, ShapeVerdict, World,
+    Reason, Scratch, Semantics, Shape, ShapePlan, ShapeScanPair, ShapeVerdict, World,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use rand::RngExt;
@@ -131,6 +131,42 @@ fn worlds_of_all_kinds_find_every_near_pair_and_the_nearest() {
         assert_eq!((nearest.upper, nearest.points), (found.upper, found.points));
     }
     assert!(kinds.iter().all(|&count| count > 3) && left_out > 1000, "{kinds:?} near, {left_out} pruned");
+}
+
+#[test]
+fn the_nearest_pair_knows_the_balls_about_points_and_its_reach() {
+    let rng = &mut rng(6111);
+    let mesh = prepared(&cube(4));
+    let scratch = &mut Scratch::default();
+    let (mut apart, mut beyond) = (0, 0);
+    for round in 0..60_u32 {
+        let (world, known) = crowd(&mesh, 8, [8.0, 20.0][round as usize % 2], rng);
+        let thickened = [0.4, 1.5][round as usize / 2 % 2];
+        let options = DistanceOptions::default().with_semantics(Semantics::Thickened(thickened));
+        let plan = DistancePlan::new(&options, &SCANS[0], &SCANS[1]).unwrap();
+        let mut least = (f64::INFINITY, f64::INFINITY);
+        for (j, b) in known.iter().enumerate() {
+            for a in &known[..j] {
+                let found = BodyPair::new(placed(a, &mesh), placed(b, &mesh)).distance(&plan, scratch);
+                let found = found.unwrap();
+                least = (found.lower.min(least.0), found.upper.min(least.1));
+            }
+        }
+        for reach in [f64::INFINITY, 0.5] {
+            let found = world.nearest_pair(Bodies::All, reach, |_, _| true, &plan, scratch);
+            assert!(
+                found.is_none_or(|found| found.lower <= reach.min(least.1)),
+                "round {round}: {found:?}, least {least:?}"
+            );
+            if least.1 < reach {
+                assert_eq!(found.unwrap().upper, least.1, "round {round}");
+            } else {
+                beyond += usize::from(found.is_some());
+            }
+        }
+        apart += usize::from(least.1 > 0.0);
+    }
+    assert!(apart > 20 && beyond > 5, "{apart} apart, {beyond} beyond the reach");
 }
 
 #[test]
@@ -313,6 +349,13 @@ fn touches_of_all_kinds_agree_with_their_distances() {
         }
     }
     assert!(kinds.iter().flatten().all(|&count| count >= 5), "all kinds touch and are apart: {kinds:?}");
+
+    // A unit ball whose frame is out of proportion to that of the mesh, which passes through it.
+    let small = Shape::Sphere { centre: [0.0; 3], radius: 1e-19 };
+    let pose = Pose::IDENTITY.with_scale(1e19);
+    let pair = BodyPair::new(PlacedBody::Mesh(mesh.at(&Pose::IDENTITY)), PlacedBody::Shape(small.at(&pose)));
+    let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[1]).unwrap();
+    assert_eq!(pair.touch(&plan, scratch).verdict, BodyVerdict::Undecided(Reason::Pose));
 
     // Invalid poses and shapes.
     let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[1]).unwrap();

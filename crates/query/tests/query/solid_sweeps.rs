@@ -1,7 +1,7 @@
 //! Shapes that move past scans, against brute force over time; distances of two shapes.
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{Motion, PointCloud, Pose};
+use nearmiss_geometry::{Motion, PointCloud, Pose, Screw};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
     CollideOptions, Placed, Scratch, Shape, ShapePlan, ShapeSweepVerdict, SupportMap, SweepReason, Target,
@@ -229,6 +229,14 @@ fn shapes_that_do_not_move_or_start_in_contact_are_told() {
         let reason = SweepReason::Shape;
         assert_eq!(verdict, ShapeSweepVerdict::Undecided { t_free: 0.0, reason }, "{shape:?}");
     }
+    // A mirrored pose bounds no speed, and what is proven before a broken pose stays proven.
+    let plate = Shape::Triangle { points: [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], radius: 0.0 };
+    let mirrored = Pose::from_translation([0.0, 0.0, 2.0]).with_scale(-1.0);
+    let verdict = told(&plate, &Motion::of_screw(Screw::new(mirrored, [0.0, 3.0, 0.0], [0.0, 0.0, -4.0])));
+    assert_eq!(verdict, ShapeSweepVerdict::Undecided { t_free: 0.0, reason: SweepReason::Pose });
+    let places = [0.5, 0.7, 1e200].map(|z| Pose::from_translation([0.0, 0.0, z]));
+    let verdict = told(&ball, &Motion::through(&places).unwrap());
+    assert!(matches!(verdict, ShapeSweepVerdict::Undecided { t_free: 1.0.., .. }), "{verdict:?}");
     // Close by for a long way: never a hit, and no proof either.
     let at = |x: f64| Pose::from_translation([x, 0.0, 0.105]);
     let along = Motion::through(&[at(-0.9), at(0.9)]).unwrap();
