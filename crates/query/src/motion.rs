@@ -9,4 +9,5 @@ pub(crate) mod interval;
 pub(crate) mod plan;
 pub(crate) mod scans;
 pub(crate) mod solids;
+pub(crate) mod step;
 pub(crate) mod travel;

@@ -67,8 +67,9 @@ impl<'a> Sweep<'a> {
     ///
     /// `Free` and `t_free` are proofs, rounding included: at no time before `t_free` do the scans
     /// come within the clearance of `plan`, with the meaning of `plan`. Contacts are found by
-    /// tests about a quarter of a local spacing apart (the way of the fastest point), so that a
-    /// shallower graze may be missed after `t_free`; then the sweep is undecided.
+    /// tests about a quarter of a local spacing apart (the way of the fastest point), or less for
+    /// scans that are smaller than that. A shallower graze may be missed after `t_free`; then the
+    /// sweep is undecided.
     ///
     /// Costs a few distance queries, and the comparison of the node pairs that come near each
     /// other, at intervals that are shorter the nearer they come (`docs/theory/motions.md`). Does

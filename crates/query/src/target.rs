@@ -186,7 +186,8 @@ impl<'a> Target<'a> {
     ///
     /// `Free` and `t_free` are proofs, as for two scans ([`Sweep`](crate::Sweep)); plans without
     /// certificates prove nothing. Where nothing is proven, contacts are looked for as far apart as the
-    /// nearest disc or ball allows, and at least a quarter of a local radius of travel.
+    /// nearest disc or ball allows, and at least a quarter of a local radius of travel, or less for smaller
+    /// shapes.
     ///
     /// Costs a few distance queries, more the longer the shape moves within about one local radius of
     /// the scan.

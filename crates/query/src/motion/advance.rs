@@ -205,6 +205,13 @@ impl<'s, C: Course> Sweeping<'s, C> {
         Travel::new(screws, 1.0, stored.each_ref(), &self.balls).of_ball(ball.centre, ball.radius)
     }
 
+    /// The radius of the smaller thing, in the world.
+    pub(crate) fn size(&self) -> f64 {
+        let stored = self.course.stored(&self.screws(0).map(|screw| *screw.start()));
+        let [a, b] = [0, 1].map(|k| self.balls[k].radius * stored[k].scale());
+        a.min(b)
+    }
+
     /// Proves the whole motion. Otherwise returns the time up to which it is proven, and the reason
     /// why the proof ends.
     pub(crate) fn prove(&mut self) -> Result<(), (f64, Stop)> {

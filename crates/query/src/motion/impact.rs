@@ -6,11 +6,9 @@ use super::advance::{Stop, SweepScratch, Sweeping};
 use super::answer::{SweepAnswer, SweepReason, SweepVerdict};
 use super::course::Course;
 use super::plan::SweepPlan;
+use super::step::least_step;
 use crate::ask::answer::{Contact, Evidence, Reason, Verdict};
 use crate::ask::budget::Budget;
-
-/// The way of b, in bands, between two tests for contact.
-const STEP: f64 = 0.25;
 
 /// Decides whether the whole motion is free, and finds the first impact otherwise.
 pub(crate) fn sweep<C: Course>(
@@ -96,7 +94,7 @@ impl<C: Course> Sweeping<'_, C> {
             if within >= length {
                 return Ok(None);
             }
-            let way = (gap - clearance).max(STEP * self.nearest.band);
+            let way = (gap - clearance).max(least_step(self.nearest.band, self.size()));
             let next = within + way / self.speed(&screws, within);
             // A speed of zero leads to the end at once.
             within = if next < length && next > within { next } else { length };

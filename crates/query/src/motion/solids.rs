@@ -1,12 +1,13 @@
 //! A convex shape that moves past a scan: conservative advancement (Mirtich 1996, chapter 2) on proven
 //! distances. Where nothing is proven, it goes on with the distance of the discs and balls, by at least
-//! a quarter of a spacing.
+//! a quarter of a spacing, or less for small shapes.
 
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Aabb, Motion, Pose, Screw};
 
 use crate::motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepReason};
+use crate::motion::step::least_step;
 use crate::pair::placed::ViewScratch;
 use crate::pair::placed_balls::is_proper;
 use crate::solid::answer::{ShapeContact, ShapeDistance};
@@ -24,9 +25,6 @@ const STEP: f64 = 0.8;
 
 /// If less than this is left of the distance, in local radii, steps are no longer proven.
 const LEFT: f64 = 0.1;
-
-/// The least way between two tests where nothing is proven, in local radii.
-const TEST: f64 = 0.25;
 
 /// Halvings of the last interval before a contact.
 const HALVINGS: u32 = 10;
@@ -148,6 +146,11 @@ impl<'s> Course<'s, '_> {
         Ok(ShapeDistance { lower: lower.max(0.0), ..found })
     }
 
+    /// The radius of the shape, in the world.
+    fn size(&self) -> f64 {
+        self.ball.1 * self.motion.at(0.0).scale()
+    }
+
     /// A bound on the speed of any point of the shape: along a screw each has a constant speed.
     fn speed(&self, screw: &Screw) -> f64 {
         let start = screw.start();
@@ -195,7 +198,8 @@ impl<'s> Course<'s, '_> {
             let is_near = left <= LEFT * found.band;
             // No disc or ball is nearer than the upper bound.
             let free = STEP * (found.upper - self.clearance);
-            let way = if is_near { free.max(TEST * found.band) } else { STEP * left };
+            let least_way = least_step(found.band, self.size());
+            let way = if is_near { free.max(least_way) } else { STEP * left };
             let next = time + way / speed;
             // What is left of the proof may reach the end of the motion.
             goes_on &= proven >= duration || !is_near && (next > time || speed == 0.0);

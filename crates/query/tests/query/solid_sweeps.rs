@@ -245,6 +245,35 @@ fn shapes_that_do_not_move_or_start_in_contact_are_told() {
 }
 
 #[test]
+fn shapes_much_smaller_than_the_spacing_pass_through_no_surface() {
+    let sampled =
+        shapes::patch(2.0, 2.0).sample(Sampling { spacing: 0.05, noise: 0.1, order: Order::Random, seed: 2 });
+    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
+    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+    let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+    let (rng, scratch) = (&mut rng(8105), &mut Scratch::default());
+    for round in 0..200_usize {
+        let size = [0.003, 0.001][round % 2];
+        let [p, q] = [0, 1].map(|_| unit_vector(rng).map(|x| x * size));
+        let shape = match round / 2 % 4 {
+            0 => Shape::Sphere { centre: [0.0; 3], radius: size },
+            1 => Shape::Box { pose: Pose::IDENTITY, half: [size; 3], radius: 0.0 },
+            2 => Shape::Capsule { ends: [p, q], radius: 0.5 * size },
+            _ => Shape::Cylinder { pose: Pose::IDENTITY, half_height: size, radius: size, rounding: 0.0 },
+        };
+        let [x, y] = [0, 1].map(|_| rng.random_range(-0.8..0.8));
+        let turned = rotation(rng);
+        let motion = Motion::through(&[0.3, -0.3].map(|z| turned.with_translation([x, y, z]))).unwrap();
+        let verdict = target.sweep(&shape, &motion, scratch).verdict;
+        let ShapeSweepVerdict::Impact { t_hit, .. } = verdict else {
+            panic!("round {round}: {shape:?} at {x} {y} passes through: {verdict:?}");
+        };
+        assert!((t_hit - 0.5).abs() * 0.6 < 0.03, "round {round}: {verdict:?}");
+    }
+}
+
+#[test]
 fn distances_of_two_shapes_equal_those_of_their_points() {
     let rng = &mut rng(3);
     for round in 0..200_usize {

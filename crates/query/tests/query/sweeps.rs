@@ -225,6 +225,11 @@ fn nothing_passes_through_a_thin_plate() {
     let motion = through(&[at(0.3, 0.2, 50.0), at(0.3, 0.2, -50.0)]);
     let question = Question::new(&plate, &ball, [&still, &motion]);
     question.meets(0.4995, 100.0, "fast through a plate");
+    // Nor does what is much smaller than the spacing.
+    let dust = sphere(300, 0.001);
+    let falls = through(&[at(0.31, 0.2, 0.5), at(0.3, 0.2, -0.5)]);
+    let question = Question::new(&plate, &dust, [&still, &falls]);
+    question.meets(0.5, 1.0, "dust through a plate");
     // Past the border of the plate nothing is hit.
     let past = through(&[at(1.3, 0.2, 50.0), at(1.3, 0.2, -50.0)]);
     let question = Question::new(&plate, &ball, [&still, &past]);
