@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nearmiss::slices::Up;
-use nearmiss::{CollideOptions, Detail, Ray, RayAnswer, Scratch, ShapePlan, Target};
-use serde::de::IgnoredAny;
+use nearmiss::{Aabb, CollideOptions, Detail, Ray, RayAnswer, Scratch, ShapePlan, Target};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::console::{Console, Results, now, warn};
 use crate::digits::{percent, place, rounded};
@@ -16,9 +16,11 @@ use crate::error::CliError;
 use crate::evidence::word;
 use crate::input::Opening;
 use crate::json_lines::JsonLines;
+use crate::label::Label;
 use crate::parse::parse_radius;
 use crate::posing;
 use crate::preprocess::parse_threads;
+use crate::units::UnitCheck;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
 use depth_picture::{Painted, Viewer};
@@ -89,6 +91,8 @@ pub struct CastArgs {
 /// The JSON output of `cast`.
 #[derive(Debug, Serialize)]
 struct CastReport {
+    #[serde(flatten)]
+    label: Label,
     /// The length of the ray up to the hit.
     t: Option<f64>,
     point: Option<[f64; 3]>,
@@ -142,12 +146,13 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
     let unit = 0.01 * scan.sampling_radius() * pose.scale();
     let asked = (&Target::new(scan.at(&pose), &plan), unit, args.json);
+    let mut check = UnitCheck::new(&scan.at(&pose), 0.0);
     if let Some([from, to]) = args.ends().filter(|_| args.image.is_none()) {
         let ray = Ray::new(from, [0, 1, 2].map(|k| to[k] - from[k])).with_radius(args.radius.unwrap_or(0.0));
-        answer(asked, &ray, "", (&mut Scratch::default(), &mut results))?;
+        answer(asked, &ray, (None, Label::default()), (&mut Scratch::default(), &mut results))?;
     }
     if let Some(rays) = &mut rays {
-        answer_all(asked, rays, &mut results)?;
+        answer_all(asked, rays, (&mut check, &mut results))?;
     }
     if let Some(path) = &args.image {
         let plan = ShapePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan)?;
@@ -160,21 +165,27 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
 type Asked<'a> = (&'a Target<'a>, f64, bool);
 
 /// Answers all rays of a file.
-fn answer_all(asked: Asked<'_>, rays: &mut RayFile, results: &mut Results) -> Result<(), CliError> {
+fn answer_all(
+    asked: Asked<'_>,
+    rays: &mut RayFile,
+    (check, results): (&mut UnitCheck, &mut Results),
+) -> Result<(), CliError> {
     let mut scratch = Scratch::default();
     while let Some((line, text)) = rays.next_line()? {
         // Answers to the lines before a faulty one are written before the error.
-        let ray = rays.ray(line, &text).or_else(|fault| results.flush().and(Err(fault)))?;
-        answer(asked, &ray, &format!("line {line}: "), (&mut scratch, results))?;
+        let (ray, label) = rays.ray(line, &text).or_else(|fault| results.flush().and(Err(fault)))?;
+        let origin = ray.origin;
+        check.compare(&Aabb { min: origin, max: origin }, format_args!("the ray on line {line}"));
+        answer(asked, &ray, (Some(line), label), (&mut scratch, results))?;
     }
     Ok(())
 }
 
-/// Answers one ray; `name` precedes the sentence about it.
+/// Answers one ray of a line, if it has one.
 fn answer(
     (target, unit, is_json): Asked<'_>,
     ray: &Ray,
-    name: &str,
+    (line, label): (Option<u64>, Label),
     (scratch, results): (&mut Scratch, &mut Results),
 ) -> Result<(), CliError> {
     let start = now();
@@ -182,10 +193,12 @@ fn answer(
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
     if !is_json {
-        return results.line(format_args!("{name}{}", sentence(&answer, unit)));
+        let start = line.map_or_else(String::new, |line| format!("line {line}{label}: "));
+        return results.line(format_args!("{start}{}", sentence(&answer, unit)));
     }
     let RayAnswer { hit, evidence } = answer;
     results.json(&CastReport {
+        label,
         t: hit.map(|hit| hit.t),
         point: hit.map(|hit| hit.point),
         normal: hit.map(|hit| hit.normal),
@@ -250,8 +263,8 @@ struct RayLine {
     max: Option<f64>,
     #[serde(default)]
     radius: f64,
-    #[serde(rename = "name", alias = "id")]
-    _name: Option<IgnoredAny>,
+    name: Option<Value>,
+    id: Option<Value>,
 }
 
 /// A file with a ray on each line.
@@ -269,10 +282,10 @@ impl RayFile {
         self.lines.next_line()
     }
 
-    /// Parses the ray on line `number`, whose text is `text`.
-    fn ray(&self, number: u64, text: &str) -> Result<Ray, CliError> {
+    /// Parses the ray on line `number`, whose text is `text`, and its label.
+    fn ray(&self, number: u64, text: &str) -> Result<(Ray, Label), CliError> {
         let line: RayLine = self.lines.parse(number, text)?;
-        let RayLine { origin, direction, max, radius, .. } = line;
+        let RayLine { origin, direction, max, radius, name, id } = line;
         let fault = |what: &str| Err(self.lines.fault_on(number, what));
         if direction == [0.0; 3] {
             return fault("expected a direction with a length above zero in `direction`, got [0, 0, 0]");
@@ -283,6 +296,7 @@ impl RayFile {
         if radius < 0.0 {
             return fault("expected a length of zero or more in `radius`, got a negative one");
         }
-        Ok(Ray::new(origin, direction).with_max(max.unwrap_or(f64::INFINITY)).with_radius(radius))
+        let ray = Ray::new(origin, direction).with_max(max.unwrap_or(f64::INFINITY)).with_radius(radius);
+        Ok((ray, Label { name, id }))
     }
 }

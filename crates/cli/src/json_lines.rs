@@ -39,12 +39,25 @@ impl JsonLines {
 
     /// Parses the object on line `number`, whose text is `text`.
     pub(crate) fn parse<T: DeserializeOwned>(&self, number: u64, text: &str) -> Result<T, CliError> {
+        self.parse_as(number, text, self.form)
+    }
+
+    /// As [`Self::parse`], for a line of this form.
+    pub(crate) fn parse_as<T: DeserializeOwned>(
+        &self,
+        number: u64,
+        text: &str,
+        form: &str,
+    ) -> Result<T, CliError> {
         // An array would be read as the fields of an object in their order.
         if !text.starts_with('{') {
-            return Err(self.fault_on(number, format!("expected an object in {{}}; {}", self.form)));
+            return Err(self.fault_on(number, format!("expected one object in {{}} on each line; {form}")));
         }
-        serde_json::from_str(text)
-            .map_err(|cause| self.fault_on(number, format!("{}; {}", json_fault(&cause), self.form)))
+        let fault = |cause: serde_json::Error| match cause.is_eof() {
+            true => format!("expected the whole object on one line, got a part of it; {form}"),
+            false => format!("{}; {form}", json_fault(&cause)),
+        };
+        serde_json::from_str(text).map_err(|cause| self.fault_on(number, fault(cause)))
     }
 
     /// Returns an error about line `number`.

@@ -32,6 +32,7 @@ mod filters;
 mod guarded;
 mod input;
 mod json_lines;
+mod label;
 mod matrix;
 mod memory;
 mod output;

@@ -11,14 +11,18 @@ use crate::console::{Console, Results, now};
 use crate::digits::{place, short};
 use crate::error::CliError;
 use crate::input::Opening;
+use crate::label::Label;
 use crate::posing;
 pub use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 use crate::touch::surface::{Asked, of_surface};
+use crate::units::UnitCheck;
 
 /// The JSON output of `touch`.
 #[derive(Debug, Serialize)]
 struct TouchReport {
+    #[serde(flatten)]
+    label: Label,
     touches: bool,
     nearest: [f64; 3],
     gap: f64,
@@ -51,12 +55,13 @@ fn of_points(
     (r, is_json): (f64, bool),
 ) -> Result<(), CliError> {
     let mut index = None;
-    let mut results = Results::new();
+    let (mut results, mut check) = (Results::new(), UnitCheck::new(placed, r));
     let mut asked = 0;
     while let Some((line, text)) = shapes.next_line()? {
         // Answers to the lines before a faulty one are written before the error.
         let read = shapes.shape(line, &text, r);
-        let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
+        let (shape, label) = read.or_else(|fault| results.flush().and(Err(fault)))?;
+        shape.compare(&mut check, line);
         asked += 1;
         if asked == MANY {
             index = Some(ShapeIndex::new(scan));
@@ -68,9 +73,9 @@ fn of_points(
         };
         if is_json {
             let NearestPoint { source, point, gap } = nearest;
-            results.json(&TouchReport { touches, nearest: point, gap, source: source.0, micros })?;
+            results.json(&TouchReport { label, touches, nearest: point, gap, source: source.0, micros })?;
         } else {
-            results.line(format_args!("line {line}: {}", sentence(touches, &nearest, 0.01 * r)))?;
+            results.line(format_args!("line {line}{label}: {}", sentence(touches, &nearest, 0.01 * r)))?;
         }
     }
     results.flush()

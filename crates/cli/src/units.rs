@@ -1,13 +1,15 @@
 //! The units of two scans: their options, and a warning if the sizes of the scans differ too much.
 
+use std::fmt::Display;
 use std::sync::Once;
 
 use clap::ValueEnum;
 use nearmiss::{Aabb, Placed};
 
-use crate::console::Console;
+use crate::console::{Console, warn};
 use crate::digits::{rough, short};
 use crate::matrix::Matrix;
+use crate::sentence::world_bounds;
 
 /// Scans are suspected to be in different units if the diagonals of their bounds differ by more
 /// than this factor. An object in a room is commonly 1 to 30 times smaller than the room; the
@@ -124,6 +126,48 @@ impl SizeCheck {
                 self.console.note(format_args!("warning: {question}"));
             }
         });
+    }
+}
+
+/// Compares shapes or rays with a scan, and warns once if one of them seems to be in another unit.
+#[derive(Debug)]
+pub(crate) struct UnitCheck {
+    /// The bounds of the scan and its sampling radius, in the world.
+    scan: Option<(Aabb, f64)>,
+}
+
+impl UnitCheck {
+    pub(crate) fn new(placed: &Placed<'_>, r: f64) -> Self {
+        Self { scan: Some((world_bounds(placed), r)) }
+    }
+
+    /// Compares a thing with these bounds, which is called `name`.
+    pub(crate) fn compare(&mut self, bounds: &Aabb, name: impl Display) {
+        let doubt = self.scan.as_ref().and_then(|(scan, r)| doubt(bounds, scan, *r));
+        if let Some(doubt) = doubt {
+            warn(format_args!("{name} {doubt}; give it in the unit of the scan"));
+            self.scan = None;
+        }
+    }
+}
+
+/// The reason to doubt that a thing is in the unit of a scan whose sampling radius is `r`, if there is one.
+fn doubt(bounds: &Aabb, scan: &Aabb, r: f64) -> Option<String> {
+    let ([p, q], size, whole) = ([bounds.centre(), scan.centre()], diagonal(bounds), diagonal(scan));
+    let away = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
+    if !(size.is_finite() && away.is_finite() && whole > 0.0) {
+        return None;
+    }
+    let of_scan = format!("the scan is {} across", short(whole));
+    if size > SUSPICIOUS * whole {
+        Some(format!("is {} across, and {of_scan}", short(size)))
+    } else if away > SUSPICIOUS * whole {
+        Some(format!("is {} away, and {of_scan}", short(away)))
+    // A single point may be meant; its bounds contain rounding.
+    } else if size > 1e-9 * r && size < r / SUSPICIOUS {
+        Some(format!("is {} across, and the spacing of the scan is {}", short(size), short(r)))
+    } else {
+        None
     }
 }
 

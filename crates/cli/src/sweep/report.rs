@@ -159,7 +159,7 @@ impl Report {
             SweepVerdict::Undecided { t_free, reason } => {
                 let why = match reason {
                     SweepReason::Near => format!(
-                        "from t = {} on they come nearer than can be proven apart (about {}{}), but no contact was found",
+                        "at t = {} they are nearer than can be proven apart (about {}{}); no contact was found up to the end",
                         time_down(t_free),
                         if are_meshes { "" } else { "two local spacings of " },
                         rough(answer.band)

@@ -6,19 +6,46 @@ use std::path::Path;
 use nearmiss::{Aabb, Pose, PoseError, Shape};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
 
 use crate::digits::short;
 use crate::error::CliError;
 use crate::json_lines::JsonLines;
+use crate::label::Label;
 use crate::matrix::{Matrix, PoseRefused};
 use crate::pose_text::JsonPose;
+use crate::units::UnitCheck;
 
 /// The form of a line, for messages.
 const SHAPE_LINE: &str =
     r#"a line is like {"sphere":{"centre":[x,y,z],"radius":r}}; `touch --help` shows all shapes"#;
 
-/// The names of the shapes.
-const SHAPES: [&str; 8] = ["sphere", "capsule", "box", "cylinder", "cone", "hull", "triangle", "segment"];
+/// The names of the shapes, and the forms of their lines.
+const SHAPES: [(&str, &str); 8] = [
+    ("sphere", r#"a sphere is {"sphere":{"centre":[x,y,z],"radius":r}}"#),
+    ("capsule", r#"a capsule is {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}"#),
+    ("box", r#"a box is {"box":{"pose":[7, 12 or 16 numbers],"half":[x,y,z]}}, with "radius":r if wanted"#),
+    (
+        "cylinder",
+        r#"a cylinder is {"cylinder":{"pose":[7, 12 or 16 numbers],"half_height":h,"radius":r}}, with "rounding":r if wanted"#,
+    ),
+    (
+        "cone",
+        r#"a cone is {"cone":{"pose":[7, 12 or 16 numbers],"half_height":h,"radius":r}}, with "rounding":r if wanted"#,
+    ),
+    ("hull", r#"a hull is {"hull":{"points":[[x,y,z],…]}}, with "radius":r if wanted"#),
+    (
+        "triangle",
+        r#"a triangle is {"triangle":{"points":[[x,y,z],[x,y,z],[x,y,z]]}}, with "radius":r if wanted"#,
+    ),
+    ("segment", r#"a segment is {"segment":{"points":[[x,y,z],[x,y,z]]}}, with "radius":r if wanted"#),
+];
+
+/// The form of a line that names a shape, or of any line.
+fn form_of(text: &str) -> &'static str {
+    let named = SHAPES.iter().find(|(name, _)| text.contains(&format!("\"{name}\"")));
+    named.map_or(SHAPE_LINE, |(_, form)| form)
+}
 
 /// A line of a file of shapes, which holds one shape. Other fields of the line are ignored; a shape may
 /// have no others, since a misspelt radius would be none.
@@ -33,6 +60,8 @@ struct ShapeLine {
     hull: Option<HullLine>,
     triangle: Option<TriangleLine>,
     segment: Option<SegmentLine>,
+    name: Option<Value>,
+    id: Option<Value>,
     #[serde(flatten)]
     others: BTreeMap<String, IgnoredAny>,
 }
@@ -111,6 +140,13 @@ impl ReadShape {
             Self::Hull(points, radius) => Shape::Hull { points, radius: *radius },
         }
     }
+
+    /// Warns if the shape on this line seems to be in another unit than the scan.
+    pub(super) fn compare(&self, check: &mut UnitCheck, line: u64) {
+        if let Some(bounds) = self.shape().bounds() {
+            check.compare(&bounds, format_args!("the shape on line {line}"));
+        }
+    }
 }
 
 impl ShapeLine {
@@ -133,7 +169,7 @@ impl ShapeLine {
             }
             (None, _, Some(name)) => {
                 let name: String = name.chars().take(40).flat_map(char::escape_debug).collect();
-                Err(format!("unknown shape `{name}`; known: {}", SHAPES.join(", ")))
+                Err(format!("unknown shape `{name}`; known: {}", SHAPES.map(|(name, _)| name).join(", ")))
             }
             (last, count, _) => {
                 let count = count + usize::from(last.is_some());
@@ -237,11 +273,13 @@ impl ShapeFile {
         self.lines.next_line()
     }
 
-    /// Parses the shape on line `number`, whose text is `text`. The pose of a solid may deviate from a
-    /// rotation by a tenth of `r`.
-    pub(super) fn shape(&self, number: u64, text: &str, r: f64) -> Result<ReadShape, CliError> {
-        let line: ShapeLine = self.lines.parse(number, text)?;
-        line.read(r).map_err(|what| self.lines.fault_on(number, what))
+    /// Parses the shape on line `number`, whose text is `text`, and its label. The pose of a solid may
+    /// deviate from a rotation by a tenth of `r`.
+    pub(super) fn shape(&self, number: u64, text: &str, r: f64) -> Result<(ReadShape, Label), CliError> {
+        let mut line: ShapeLine = self.lines.parse_as(number, text, form_of(text))?;
+        let label = Label { name: line.name.take(), id: line.id.take() };
+        let shape = line.read(r).map_err(|what| self.lines.fault_on(number, what))?;
+        Ok((shape, label))
     }
 
     /// The error about a shape at a distance that is not finite.

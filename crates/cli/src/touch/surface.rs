@@ -9,12 +9,14 @@ use nearmiss::{
 use serde::Serialize;
 
 use crate::console::{Results, now};
-use crate::digits::{place, rough, rounded_down, short};
+use crate::digits::{place, rounded, rounded_down, short};
 use crate::error::CliError;
 use crate::evidence::word;
+use crate::label::Label;
 use crate::penetration::{PenetrationReport, penetration_sentence};
 use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
+use crate::units::UnitCheck;
 
 /// The question about each shape.
 #[derive(Debug, Clone, Copy)]
@@ -69,6 +71,8 @@ impl Asked {
 /// The JSON output of `touch --surface`.
 #[derive(Debug, Serialize)]
 struct SurfaceReport<'a> {
+    #[serde(flatten)]
+    label: Label,
     touches: Option<bool>,
     evidence: Option<&'static str>,
     reason: Option<&'static str>,
@@ -93,10 +97,12 @@ pub(super) fn of_surface(
     let options = CollideOptions::default().with_semantics(asked.semantics).with_margin(asked.margin);
     let plan = ShapePlan::new(&options, placed.scan())?;
     let target = Target::new(*placed, &plan);
+    let mut check = UnitCheck::new(placed, r);
     let (mut scratch, mut contacts, mut results) = (Scratch::default(), Vec::new(), Results::new());
     while let Some((line, text)) = shapes.next_line()? {
         let read = shapes.shape(line, &text, r);
-        let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
+        let (shape, label) = read.or_else(|fault| results.flush().and(Err(fault)))?;
+        shape.compare(&mut check, line);
         let shape = shape.shape();
         let report = answer(&target, &shape, &mut contacts, &mut scratch);
         let Some(mut report) = report else {
@@ -107,18 +113,22 @@ pub(super) fn of_surface(
             .map(|interior| target.penetration(&shape, interior, &asked.budget(), &mut scratch));
         report.penetration = penetration.as_ref().map(PenetrationReport::new);
         if is_json {
+            report.label = label;
             results.json(&report)?;
         } else {
             let way = penetration
                 .and_then(|found| penetration_sentence(&found, ["it", "it from the scan"], 0.01 * r));
             let way = way.map_or_else(String::new, |way| format!(" {way}"));
-            results.line(format_args!("line {line}: {}{way}", sentence(&report, asked.margin, 0.01 * r)))?;
+            results.line(format_args!(
+                "line {line}{label}: {}{way}",
+                sentence(&report, asked.margin, 0.01 * r)
+            ))?;
         }
     }
     results.flush()
 }
 
-/// Answers all questions about a shape. `None` if it is invalid.
+/// Answers all questions about a shape. `None` if it is invalid, too far away or too large.
 fn answer<'c>(
     target: &Target<'_>,
     shape: &Shape<'_>,
@@ -137,7 +147,10 @@ fn answer<'c>(
         ShapeVerdict::Undecided(Reason::Undersampled) => (None, None, Some("undersampled")),
         ShapeVerdict::Undecided(_) => return None,
     };
-    Some(SurfaceReport {
+    let is_told = touches != Some(false) || distance.is_some();
+    let is_told = is_told && contacts.iter().all(|contact| contact.depth.is_finite());
+    is_told.then(|| SurfaceReport {
+        label: Label::default(),
         touches,
         evidence: evidence.map(word),
         reason,
@@ -158,10 +171,9 @@ fn sentence(report: &SurfaceReport<'_>, margin: f64, unit: f64) -> String {
             let within =
                 if margin > 0.0 { format!("is within {} of it", short(margin)) } else { "touches it".into() };
             let deepest = report.contacts.first().map_or_else(String::new, |contact| {
-                let [u, v, w] = contact.normal;
                 let what = if contact.depth >= 0.0 { "deep" } else { "away" };
-                let (at, depth) = (place(contact.point, unit), rough(contact.depth.abs()));
-                format!(" {depth} {what} at {at}; the normal there is ({u:.4}, {v:.4}, {w:.4}).")
+                let (at, depth) = (place(contact.point, unit), rounded(contact.depth.abs(), unit));
+                format!(" {depth} {what} at {at}; the normal there is {}.", place(contact.normal, 1e-4))
             });
             format!("The shape {within} ({evidence}).{deepest}")
         }

@@ -7,7 +7,7 @@ use crate::running::{Place, keys, numbers, shift, sorted};
 /// Rays from inside and outside a ball of radius 1 at (3, 0, 0) in the world.
 const RAYS: &str = r#"
 {"origin":[3,0,0],"direction":[0,0,2],"name":"from inside"}
-{"origin":[0,0,0],"direction":[1,0,0]}
+{"origin":[0,0,0],"direction":[1,0,0],"name":["beam"],"id":7}
 
 {"origin":[0,0,0],"direction":[1,0,0],"max":1.5}
 {"origin":[0,0,0],"direction":[1,0,0],"radius":0.25}
@@ -22,7 +22,9 @@ fn rays_hit_a_ball_where_it_is() {
     let pose = shift(3.0, 0.0, 0.0);
     let asked = ["cast", "ball.xyz", "--rays", "rays.jsonl", "--pose", &pose, "--json"];
     let told = place.ok(&asked).json();
-    assert_eq!(keys(&told[0]), sorted("t point normal source evidence micros"));
+    assert_eq!(keys(&told[0]), sorted("name t point normal source evidence micros"));
+    assert_eq!(keys(&told[2]), sorted("t point normal source evidence micros"));
+    assert!(told[0]["name"] == "from inside" && told[1]["id"] == 7 && told[1]["name"][0] == "beam");
     for (line, expected) in told.iter().zip([Some(1.0), Some(2.0), None, Some(1.75), None]) {
         let t = line["t"].as_f64();
         assert_eq!(t.is_some(), expected.is_some(), "{line} for {expected:?}");
@@ -42,10 +44,15 @@ fn rays_hit_a_ball_where_it_is() {
     let people = place.ok(&asked[..6]).results;
     let lines: Vec<&str> = people.lines().collect();
     assert!(
-        lines[0].starts_with("line 2: It hits (3.0") && lines[0].contains("(certified), at point "),
+        lines[0].starts_with("line 2 (from inside): It hits (3.0")
+            && lines[0].contains("(certified), at point "),
         "{people}"
     );
+    assert!(lines[1].starts_with("line 3 (7): It hits"), "{people}");
     assert_eq!(lines[2], "line 5: It hits nothing (certified).", "{people}");
+    place.write("rays.jsonl", r#"{"origin":[-2000,0,0],"direction":[0,1,0]}"#);
+    let far = place.ok(&asked[..4]).errors;
+    assert!(far.contains("the ray on line 1 is 2000 away, and the scan is 3.46 across"), "{far}");
 }
 
 #[test]
@@ -79,7 +86,7 @@ fn what_is_no_ray_is_refused_with_its_line() {
         (r#"{"origin":[0,0,0]}"#, &["line 2", "direction"]),
         (r#"{"origin":[0,0,0],"direction":[0,0,1],"max":-1}"#, &["line 2", "`max`"]),
         (r#"{"origin":[0,0,0],"direction":[0,0,1],"radius":-1}"#, &["line 2", "`radius`"]),
-        ("ray", &["line 2", "expected an object in {}"]),
+        ("ray", &["line 2", "expected one object in {}"]),
     ] {
         place.write("rays.jsonl", format!("{good}\n{line}\n"));
         place.refused(1, &["cast", "ball.xyz", "--rays", "rays.jsonl"], words);

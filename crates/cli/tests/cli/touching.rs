@@ -25,7 +25,9 @@ fn shapes_touch_a_ball_where_they_do() {
     let pose = shift(3.0, 0.0, 0.0);
     let asked = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--pose", &pose, "--json"];
     let told = place.ok(&asked).json();
-    assert_eq!(keys(&told[0]), sorted("touches nearest gap source micros"));
+    assert_eq!(keys(&told[0]), sorted("name touches nearest gap source micros"));
+    assert_eq!(keys(&told[1]), sorted("touches nearest gap source micros"));
+    assert_eq!(told[0]["name"], "above");
     let touches: Vec<bool> = told.iter().map(|line| line["touches"].as_bool().unwrap()).collect();
     assert_eq!(touches, [false, true, false, true, false, true], "{told:?}");
     for (line, expected) in told.iter().zip([0.5, -0.1, 0.25, -0.2, 1.25, 0.0]) {
@@ -38,7 +40,10 @@ fn shapes_touch_a_ball_where_they_do() {
     }
     let people = place.ok(&asked[..6]).results;
     let lines: Vec<&str> = people.lines().collect();
-    assert!(lines[0].starts_with("line 2: No contact; 0.5") && lines[0].contains(" from point "), "{people}");
+    assert!(
+        lines[0].starts_with("line 2 (above): No contact; 0.5") && lines[0].contains(" from point "),
+        "{people}"
+    );
     assert!(lines[1].starts_with("line 3: It touches point ") && lines.len() == 6, "{people}");
 }
 
@@ -49,14 +54,16 @@ fn what_is_no_shape_is_refused_with_its_line() {
     let good = r#"{"sphere":{"centre":[3,0,2],"radius":0.5}}"#;
     for (line, words) in [
         (r#"{"sphere":{"centre":[0,0,0],"radius":-1}}"#, &["line 2", "`radius`, got -1"][..]),
-        (r#"{"sphere":{"centre":[0,0],"radius":1}}"#, &["line 2", "column"]),
+        (r#"{"sphere":{"centre":[0,0],"radius":1}}"#, &["line 2", "column", r#"a sphere is {"sphere""#]),
         (r#"{"sphere":{"centre":[0,0,0]}}"#, &["line 2", "radius"]),
         (
             r#"{"box":{"pose":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1],"radios":1}}"#,
             &["line 2", "unknown field `radios`"],
         ),
         (r#"{"prism":{}}"#, &["line 2", "unknown shape `prism`; known: sphere, capsule, box, cylinder"]),
-        (r#"{"cone":{}}"#, &["line 2", "pose"]),
+        (r#"{"cone":{}}"#, &["line 2", "pose", r#"a cone is {"cone":{"pose":"#]),
+        (r#"{"capsule":{"#, &["line 2", "the whole object on one line", "a capsule is"]),
+        (r#"[{"sphere":{"centre":[0,0,0],"radius":1}}]"#, &["line 2", "one object in {} on each line"]),
         (r#"{"hull":{"points":[]}}"#, &["line 2", "at least one point in `points`"]),
         (r#"{"segment":{"points":[[0,0,0],[1,0,0]],"radius":-2}}"#, &["line 2", "`radius`, got -2"]),
         (
@@ -71,7 +78,7 @@ fn what_is_no_shape_is_refused_with_its_line() {
             r#"{"box":{"pose":[1,0,0,0,0,2,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1]}}"#,
             &["line 2", "pose", "rotation"],
         ),
-        ("sphere", &["line 2", "expected an object in {}"]),
+        ("sphere", &["line 2", "expected one object in {}"]),
         (r#"{"type":"sphere","radius":1}"#, &["line 2", "as the key, got `type`", r#"{"sphere":"#]),
         (
             r#"{"box":{"pose":[0,0,0,1],"half":[1,1,1]}}"#,
@@ -90,6 +97,52 @@ fn what_is_no_shape_is_refused_with_its_line() {
     );
     place.refused(2, &["touch", "ball.xyz"], &["--shapes"]);
     place.refused(1, &["touch", "ball.xyz", "--shapes", "none.jsonl"], &["none.jsonl", "no such file"]);
+}
+
+/// A point far away leaves too few digits for the others.
+#[test]
+fn a_stray_point_beyond_all_measure_is_named() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    let points = std::fs::read_to_string(place.path("ball.xyz")).unwrap();
+    place.write("stray.xyz", format!("{points}\n1e7 1e7 1e7\n"));
+    let words =
+        ["stray.xyz", "for a spacing of 7.0", "coordinates up to 1.00e7", "remove points that are far"];
+    place.refused(1, &["preprocess", "stray.xyz", "-o", "stray.nm"], &words);
+    place.ok(&["preprocess", "stray.xyz", "-o", "stray.nm", "--remove-outliers", "16,2"]);
+}
+
+/// A shape in millimetres beside a scan in metres is likely a mistake, and one beyond all measure is refused.
+#[test]
+fn shapes_in_another_unit_are_doubted() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.2);
+    let ask = |line: &str, surface: bool| {
+        place.write("shapes.jsonl", line);
+        let asked = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--surface"];
+        place.run(&asked[..if surface { 5 } else { 4 }])
+    };
+    for (line, words) in [
+        (r#"{"sphere":{"centre":[0,0,2000],"radius":1}}"#, Some("the shape on line 1 is 2000 away")),
+        (r#"{"sphere":{"centre":[0,0,0],"radius":300}}"#, Some("the shape on line 1 is 1039 across")),
+        (r#"{"sphere":{"centre":[0,0,1],"radius":0.001}}"#, Some("and the spacing of the scan is 0.")),
+        (r#"{"sphere":{"centre":[0,0,1],"radius":0.1}}"#, None),
+        (r#"{"sphere":{"centre":[0,0,20],"radius":0}}"#, None),
+    ] {
+        for surface in [false, true] {
+            let told = ask(line, surface).errors;
+            let is_doubted = told.contains("give it in the unit of the scan");
+            assert_eq!(is_doubted, words.is_some(), "{line}: {told}");
+            assert!(words.is_none_or(|words| told.contains(words)), "{line}: {told}");
+        }
+    }
+    for line in
+        [r#"{"sphere":{"centre":[1e300,0,0],"radius":1}}"#, r#"{"sphere":{"centre":[0,0,0],"radius":1e300}}"#]
+    {
+        place.write("shapes.jsonl", line);
+        let asked = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--surface"];
+        place.refused(1, &asked, &["line 1", "too far away or too large"]);
+    }
 }
 
 /// Shapes near and in a floor at z = 0, with half their depth or twice their distance.
@@ -138,7 +191,7 @@ fn shapes_on_a_floor_have_contacts_with_the_surface() {
     let thick = ["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--thickened", "0.05", "--json"];
     assert!(place.ok(&thick).json().iter().all(|line| line["evidence"] == "certified"), "balls are exact");
     let people = place.ok(&asked[..5]).results;
-    assert!(people.contains("line 2: The shape touches it (certified). 0.01 deep at "), "{people}");
+    assert!(people.contains("line 2: The shape touches it (certified). 0.0100 deep at "), "{people}");
     place.refused(
         2,
         &["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--margin", "1"],

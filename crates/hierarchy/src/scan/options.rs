@@ -122,6 +122,17 @@ pub enum BuildError {
     /// The reach is not positive and finite, or vanishes beside the scan's extent.
     #[error("expected a finite reach above 0 and above the rounding error of positions, got {0}")]
     Reach(f64),
+    /// The points spread so far that the rounding error of positions exceeds their spacing.
+    #[error(
+        "expected positions that are precise enough for a spacing of {spacing:.2e}, got coordinates up to {extent:.2e}; \
+         remove points that are far from all others, or give a reach"
+    )]
+    Spread {
+        /// The greatest spacing of most points.
+        spacing: f64,
+        /// The greatest coordinate.
+        extent: f64,
+    },
     /// The workspace failed.
     #[error(transparent)]
     Work(#[from] WorkError),

@@ -55,7 +55,14 @@ impl Sampling {
         work.progress().reach(share::RADII);
         let mut selection = Selection::default();
         let reach = reach_of(options, selection.of(&radii), unit);
-        check_reach(reach, extent(positions), unit)?;
+        let far = extent(positions);
+        check_reach(reach, far, unit).map_err(|refused| match options.reach {
+            Some(_) => refused,
+            None => {
+                let [spacing, extent] = [reach / REACH, far].map(|x| f64::from(x) / unit);
+                BuildError::Spread { spacing, extent }
+            }
+        })?;
         limit(&mut spacings, &mut radii, reach);
         let sampling_radius = selection.of(&radii);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
