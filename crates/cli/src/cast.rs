@@ -20,6 +20,7 @@ use crate::label::Label;
 use crate::parse::parse_radius;
 use crate::posing;
 use crate::preprocess::parse_threads;
+use crate::sentence::world_bounds;
 use crate::units::UnitCheck;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
@@ -146,7 +147,7 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
     let unit = 0.01 * scan.sampling_radius() * pose.scale();
     let asked = (&Target::new(scan.at(&pose), &plan), unit, args.json);
-    let mut check = UnitCheck::new(&scan.at(&pose), 0.0);
+    let mut check = UnitCheck::new(world_bounds(&scan.at(&pose)), 0.0);
     if let Some([from, to]) = args.ends().filter(|_| args.image.is_none()) {
         let ray = Ray::new(from, [0, 1, 2].map(|k| to[k] - from[k])).with_radius(args.radius.unwrap_or(0.0));
         answer(asked, &ray, (None, Label::default()), (&mut Scratch::default(), &mut results))?;

@@ -13,6 +13,7 @@ use crate::error::CliError;
 use crate::input::Opening;
 use crate::label::Label;
 use crate::posing;
+use crate::sentence::world_bounds;
 pub use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 use crate::touch::surface::{Asked, of_surface};
@@ -55,7 +56,7 @@ fn of_points(
     (r, is_json): (f64, bool),
 ) -> Result<(), CliError> {
     let mut index = None;
-    let (mut results, mut check) = (Results::new(), UnitCheck::new(placed, r));
+    let (mut results, mut check) = (Results::new(), UnitCheck::new(world_bounds(placed), r));
     let mut asked = 0;
     while let Some((line, text)) = shapes.next_line()? {
         // Answers to the lines before a faulty one are written before the error.

@@ -9,7 +9,6 @@ use nearmiss::{Aabb, Placed};
 use crate::console::{Console, warn};
 use crate::digits::{rough, short};
 use crate::matrix::Matrix;
-use crate::sentence::world_bounds;
 
 /// Scans are suspected to be in different units if the diagonals of their bounds differ by more
 /// than this factor. An object in a room is commonly 1 to 30 times smaller than the room; the
@@ -137,8 +136,8 @@ pub(crate) struct UnitCheck {
 }
 
 impl UnitCheck {
-    pub(crate) fn new(placed: &Placed<'_>, r: f64) -> Self {
-        Self { scan: Some((world_bounds(placed), r)) }
+    pub(crate) fn new(bounds: Aabb, r: f64) -> Self {
+        Self { scan: Some((bounds, r)) }
     }
 
     /// Compares a thing with these bounds, which is called `name`.

@@ -122,8 +122,9 @@ impl<'a> Target<'a> {
     ///
     /// The normal of a disc points outwards if the scan is oriented, otherwise to the side of the
     /// shape's centre. If the shape's centre is before some surfaces of an oriented scan and behind others,
-    /// as at a thin plate, contacts with those that it is behind are left out. With [`Detail::Witness`](crate::Detail) each contact is moved
-    /// onto the surface by one evaluation of the implicit function.
+    /// as at a thin plate, contacts with those that it is behind are left out. With
+    /// [`Detail::Witness`](crate::Detail) each contact is moved onto the surface by one evaluation of the
+    /// implicit function.
     pub fn contacts(&self, shape: &Shape<'_>, out: &mut Vec<ShapeContact>, scratch: &mut Scratch) {
         self.gather(shape, None, out, scratch);
     }

@@ -281,7 +281,8 @@ impl World {
     /// length `reach`. Pairs of ids in `ignore` do not count, such as neighbouring links of a robot.
     ///
     /// Returns the ids and a `Distance` without sources and a band, or None if no pair counts. The lower
-    /// bound is at most `reach`, and holds for all pairs that count. Options are `thickened`, `surface_only` and `relative`.
+    /// bound is at most `reach`, and holds for all pairs that count. Options are `thickened`, `surface_only`
+    /// and `relative`.
     #[pyo3(signature = (reach = f64::INFINITY, *, ignore = Vec::new(), of = None, **options))]
     fn nearest(
         &self,

@@ -14,6 +14,7 @@ use crate::error::CliError;
 use crate::evidence::word;
 use crate::label::Label;
 use crate::penetration::{PenetrationReport, penetration_sentence};
+use crate::sentence::world_bounds;
 use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 use crate::units::UnitCheck;
@@ -97,7 +98,7 @@ pub(super) fn of_surface(
     let options = CollideOptions::default().with_semantics(asked.semantics).with_margin(asked.margin);
     let plan = ShapePlan::new(&options, placed.scan())?;
     let target = Target::new(*placed, &plan);
-    let mut check = UnitCheck::new(placed, r);
+    let mut check = UnitCheck::new(world_bounds(placed), r);
     let (mut scratch, mut contacts, mut results) = (Scratch::default(), Vec::new(), Results::new());
     while let Some((line, text)) = shapes.next_line()? {
         let read = shapes.shape(line, &text, r);
