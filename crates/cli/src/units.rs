@@ -157,14 +157,14 @@ fn doubt(bounds: &Aabb, scan: &Aabb, r: f64) -> Option<String> {
     if !(size.is_finite() && away.is_finite() && whole > 0.0) {
         return None;
     }
-    let of_scan = format!("the scan is {} across", short(whole));
+    let of_scan = format!("the scan is {} from corner to corner", short(whole));
     if size > SUSPICIOUS * whole {
-        Some(format!("is {} across, and {of_scan}", short(size)))
+        Some(format!("is {} from corner to corner, and {of_scan}", short(size)))
     } else if away > SUSPICIOUS * whole {
         Some(format!("is {} away, and {of_scan}", short(away)))
     // A single point may be meant; its bounds contain rounding.
     } else if size > 1e-9 * r && size < r / SUSPICIOUS {
-        Some(format!("is {} across, and the spacing of the scan is {}", short(size), short(r)))
+        Some(format!("is {} from corner to corner, and the spacing of the scan is {}", short(size), short(r)))
     } else {
         None
     }

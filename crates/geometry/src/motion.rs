@@ -175,7 +175,7 @@ impl Motion {
         let from = poses.first().map_or(1.0, Pose::scale);
         for (index, pose) in poses.iter().enumerate() {
             let to = pose.scale();
-            if (to - from).abs() > SAME_SCALE * from {
+            if (to - from).abs() > SAME_SCALE * from.abs() {
                 return Err(MotionError::Scale { index, from, to });
             }
         }

@@ -43,7 +43,7 @@ const SHAPES: [(&str, &str); 8] = [
 
 /// The form of a line that names a shape, or of any line.
 fn form_of(text: &str) -> &'static str {
-    let named = SHAPES.iter().find(|(name, _)| text.contains(&format!("\"{name}\"")));
+    let named = SHAPES.iter().find(|(name, _)| text.contains(&format!("\"{name}\":")));
     named.map_or(SHAPE_LINE, |(_, form)| form)
 }
 

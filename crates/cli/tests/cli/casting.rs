@@ -52,7 +52,10 @@ fn rays_hit_a_ball_where_it_is() {
     assert_eq!(lines[2], "line 5: It hits nothing (certified).", "{people}");
     place.write("rays.jsonl", r#"{"origin":[-2000,0,0],"direction":[0,1,0]}"#);
     let far = place.ok(&asked[..4]).errors;
-    assert!(far.contains("the ray on line 1 is 2000 away, and the scan is 3.46 across"), "{far}");
+    assert!(
+        far.contains("the ray on line 1 is 2000 away, and the scan is 3.46 from corner to corner"),
+        "{far}"
+    );
 }
 
 #[test]

@@ -124,7 +124,10 @@ fn shapes_in_another_unit_are_doubted() {
     };
     for (line, words) in [
         (r#"{"sphere":{"centre":[0,0,2000],"radius":1}}"#, Some("the shape on line 1 is 2000 away")),
-        (r#"{"sphere":{"centre":[0,0,0],"radius":300}}"#, Some("the shape on line 1 is 1039 across")),
+        (
+            r#"{"sphere":{"centre":[0,0,0],"radius":300}}"#,
+            Some("the shape on line 1 is 1039 from corner to corner"),
+        ),
         (r#"{"sphere":{"centre":[0,0,1],"radius":0.001}}"#, Some("and the spacing of the scan is 0.")),
         (r#"{"sphere":{"centre":[0,0,1],"radius":0.1}}"#, None),
         (r#"{"sphere":{"centre":[0,0,20],"radius":0}}"#, None),

@@ -69,7 +69,7 @@ impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
             Semantics::Thickened(radius) => radius,
             Semantics::Obstacle | Semantics::Surface => 0.0,
         };
-        // The boxes of the broad phase are those of the points.
+        // The boxes of the broad phase do not contain the balls about points.
         let thickness = |pair: [BodyId; 2]| -> f64 {
             pair.map(|id| if let Some(PlacedBody::Scan(_)) = self.body(id) { radius } else { 0.0 })
                 .iter()
@@ -94,7 +94,7 @@ impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
                 _ => NearestPair { ids, points, lower, upper },
             });
         }
-        best.map(|best| NearestPair { lower: best.lower.min(reach), ..best })
+        best.map(|best| NearestPair { lower: best.lower.min(reach.max(0.0)), ..best })
     }
 
     /// Returns the distance of the bounding boxes of two bodies: a lower bound of theirs. 0 for bodies

@@ -94,7 +94,9 @@ impl<C: Course> Sweeping<'_, C> {
             if within >= length {
                 return Ok(None);
             }
-            let way = (gap - clearance).max(least_step(self.nearest.band, self.size()));
+            // What counts as contact is wider by these.
+            let wider = clearance + self.plan.thickness().unwrap_or(0.0);
+            let way = (gap - clearance).max(least_step(self.nearest.band, self.size() + wider));
             let next = within + way / self.speed(&screws, within);
             // A speed of zero leads to the end at once.
             within = if next < length && next > within { next } else { length };

@@ -198,7 +198,8 @@ impl<'s> Course<'s, '_> {
             let is_near = left <= LEFT * found.band;
             // No disc or ball is nearer than the upper bound.
             let free = STEP * (found.upper - self.clearance);
-            let least_way = least_step(found.band, self.size());
+            let wider = self.clearance + self.elements.beyond_boxes() * self.elements.scale();
+            let least_way = least_step(found.band, self.size() + wider);
             let way = if is_near { free.max(least_way) } else { STEP * left };
             let next = time + way / speed;
             // What is left of the proof may reach the end of the motion.

@@ -179,15 +179,15 @@ impl<P: Probe> Search<'_, P> {
     /// lead into another part of a hollow thing.
     fn leave_contacts(&mut self) -> ControlFlow<()> {
         for i in 0..self.contacts.some.len() {
-            let Surveyed { normals: [way, _], depth, .. } = self.contacts.some[i];
-            for length in LONGER.map(|longer| longer * depth) {
-                if length > 0.0
-                    && length < self.best.length * (1.0 - GAIN)
-                    && self.probe.is_apart(way * length)?
-                {
-                    self.best = Shift { way, length, meets: 0.0 };
-                    self.bisect(GAIN)?;
-                    break;
+            let Surveyed { normals: [normal, _], depths, .. } = self.contacts.some[i];
+            for (way, depth) in [normal, -normal].into_iter().zip(depths) {
+                for length in LONGER.map(|longer| longer * depth) {
+                    let is_shorter = length > 0.0 && length < self.best.length * (1.0 - GAIN);
+                    if is_shorter && self.probe.is_apart(way * length)? {
+                        self.best = Shift { way, length, meets: 0.0 };
+                        self.bisect(GAIN)?;
+                        break;
+                    }
                 }
             }
         }

@@ -132,9 +132,15 @@ impl Probe for ShapeProbe<'_, '_> {
         let frame = self.elements.placed.stored_to_world();
         for contact in &self.memory.contacts {
             let normal = Vector::from(frame.rotate_inverse(contact.normal));
-            let point = frame.apply_inverse(contact.point).into();
-            let depth = contact.depth / frame.scale();
-            survey.add(Surveyed { point, normals: [normal, Vector::zeros()], depth }, 0.0);
+            let point = Vector::from(frame.apply_inverse(contact.point));
+            let more = self.elements.margin;
+            // A shift to the other side of the surface leads into a solid.
+            let beyond = match self.is_solid {
+                true => 0.0,
+                false => normal.dot(&(self.solid.support(&normal) - point)) + self.solid.radius + more,
+            };
+            let depths = [contact.depth / frame.scale() + more, beyond];
+            survey.add(Surveyed { point, normals: [normal, Vector::zeros()], depths }, 0.0);
         }
         ControlFlow::Continue(())
     }

@@ -12,8 +12,8 @@ pub(crate) struct Surveyed {
     pub(crate) point: Vector,
     /// The unit normals of both surfaces; 0 if they are not known.
     pub(crate) normals: [Vector; 2],
-    /// The shift along the first normal that ends the contact; 0 if it is not known.
-    pub(crate) depth: f64,
+    /// The shifts along the first normal and against it that end the contact; 0 if they are not known.
+    pub(crate) depths: [f64; 2],
 }
 
 /// The contacts of two things in brief.
@@ -85,7 +85,7 @@ impl ContactSurvey {
     /// Adds contacts; `depth` returns the greatest shift under which one stays, from its residual.
     pub(crate) fn add_all(&mut self, contacts: &Contacts, depth: impl Fn(f64) -> f64) {
         for contact in &contacts.contacts {
-            let own = Surveyed { point: contact.point.into(), normals: normals(contact), depth: 0.0 };
+            let own = Surveyed { point: contact.point.into(), normals: normals(contact), depths: [0.0; 2] };
             self.add(own, depth(contact.residual));
         }
     }

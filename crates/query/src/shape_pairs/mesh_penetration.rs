@@ -178,7 +178,7 @@ impl Probe for ShapeMeshProbe<'_> {
             let normal = normal.try_normalize(0.0).unwrap_or(zero);
             let out = probe.out_of(corners, zero, survey.least);
             let (way, depth) = out.map_or((zero, 0.0), |out| (out.way, out.lower));
-            survey.add(Surveyed { point: place, normals: [way, normal], depth }, depth);
+            survey.add(Surveyed { point: place, normals: [way, normal], depths: [depth, 0.0] }, depth);
             ControlFlow::Continue(())
         })
     }

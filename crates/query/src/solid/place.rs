@@ -139,8 +139,15 @@ fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<Gap> {
 fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Option<Place> {
     let way = gap.on_core - centre;
     let is_in = way.norm() <= solid.rounding(&centre);
-    let normal = if is_in { solid.inside - centre } else { way }.try_normalize(0.0);
-    let normal = normal.unwrap_or_else(Vector::z);
+    let least = solid.half.imin();
+    let is_flat = solid.half[least] <= solid.rounding(&centre) && !solid.is_point();
+    // Out of a flat core, across it.
+    let normal = match (is_in, is_flat) {
+        (false, _) => way,
+        (true, false) => solid.inside - centre,
+        (true, true) => solid.axes[least],
+    };
+    let normal = normal.try_normalize(0.0).unwrap_or_else(Vector::z);
     let inside = if is_in { -normal.dot(&(solid.support(&-normal) - centre)) } else { 0.0 };
     let depth = solid.radius + radius - way.norm() + inside;
     Some(Place { point: centre + normal * radius, normal, depth }).filter(|it| it.depth.is_finite())

@@ -15,6 +15,10 @@ const REACH: f64 = 4.0;
 /// contact with a wall tells nothing about the floor.
 const SAME: f64 = 0.7;
 
+/// The greatest distance of the disc from the plane of that contact, in local radii. A contact with the floor
+/// tells nothing about the ceiling.
+const LEVEL: f64 = 1.0;
+
 /// The rules for the direction in which a shape moves out of a disc: the scan if it is oriented, then a
 /// contact of the last frame, then a point of the shape. In the stored frame.
 #[derive(Debug)]
@@ -57,12 +61,16 @@ impl Sides {
     }
 
     /// The cosine of the normals of a disc and of the nearest contact of the last frame with a similar
-    /// normal, if that is near.
+    /// plane, if that is near.
     fn known(&self, disc: &FlatDisc, band: f64) -> Option<f64> {
-        let cosine = |known: &&(Vector, Vector)| known.1.dot(&disc.normal);
+        let cosine = |known: &(Vector, Vector)| known.1.dot(&disc.normal);
         let away = |known: &(Vector, Vector)| (known.0 - disc.centre).norm_squared();
-        let similar = self.known[..self.count].iter().filter(|known| cosine(known).abs() >= SAME);
+        let is_similar = |known: &&(Vector, Vector)| {
+            let off = known.1.dot(&(known.0 - disc.centre)).abs();
+            cosine(known).abs() >= SAME && off <= LEVEL * band
+        };
+        let similar = self.known[..self.count].iter().filter(is_similar);
         let nearest = similar.min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        (away(nearest) <= (REACH * band).powi(2)).then(|| cosine(&nearest))
+        (away(nearest) <= (REACH * band).powi(2)).then(|| cosine(nearest))
     }
 }

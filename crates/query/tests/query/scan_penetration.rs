@@ -280,23 +280,32 @@ fn shapes_in_a_solid() {
     assert_eq!(ask(0.3, HOLLOW).upper, 0.0, "inside, it touches nothing");
     let inwards = ask(0.8, HOLLOW);
     assert!((inwards.upper - 0.1).abs() < 0.04 && inwards.direction[0] < -0.98, "{inwards:?}");
-    // Large ones nearly fill the ball, so the way back into it is of little more than one length.
-    let rng = &mut rng(8804);
-    for _ in 0..100 {
-        let (out, radius) = (Vector::from(unit_vector(rng)), rng.random_range(0.5..0.88));
-        let away = rng.random_range(1.05 - radius..0.9);
-        let shape = Shape::Sphere { centre: (out * away).into(), radius };
-        let found = target.penetration(&shape, HOLLOW, &Budget::UNLIMITED, &mut Scratch::default());
-        let exact = (away + radius - 1.0).min(1.0 + radius - away);
-        assert!(found.lower <= exact + 0.04, "{exact}: {found:?} of {shape:?}");
-        assert!((found.upper - exact).abs() < 0.04, "{exact}: {found:?} of {shape:?}");
-    }
-    let mut ask = |x: f64, interior| {
-        let shape = Shape::Sphere { centre: [x, 0.0, 0.0], radius: 0.3 };
-        target.penetration(&shape, interior, &Budget::UNLIMITED, scratch)
-    };
     assert_eq!(ask(1.4, SOLID).upper, 0.0);
     assert_eq!(ask(f64::NAN, SOLID).upper, f64::INFINITY);
+}
+
+/// Balls that nearly fill a hollow one: the way back into it is of little more than one length. Its normals may
+/// point outwards, so that contacts are behind the surface.
+#[test]
+fn large_shapes_in_a_hollow_ball() {
+    let ball = prepare(sphere(1.0), 0.0);
+    let mut oriented = ball.clone();
+    let outwards: Vec<[f32; 3]> = (0..ball.len()).map(|i| ball.arrays().position(i)).collect();
+    oriented.turn_normals(&outwards);
+    let (rng, scratch) = (&mut rng(8804), &mut Scratch::default());
+    for round in 0..160_usize {
+        let margin = [0.0, 0.08][round % 2];
+        let scan = if round / 2 % 2 == 0 { &ball } else { &oriented };
+        let plan = ShapePlan::new(&CollideOptions::default().with_margin(margin), scan).unwrap();
+        let target = Target::new(Placed::new(scan, &Pose::IDENTITY), &plan);
+        let (out, radius) = (Vector::from(unit_vector(rng)), rng.random_range(0.5..0.85));
+        let away = rng.random_range(1.05 - radius..0.9);
+        let shape = Shape::Sphere { centre: (out * away).into(), radius };
+        let found = target.penetration(&shape, HOLLOW, &Budget::UNLIMITED, scratch);
+        let exact = (away + radius - 1.0).min(1.0 + radius - away) + margin;
+        let context = format!("{exact}, margin {margin}, {}: {found:?} of {shape:?}", scan.is_oriented());
+        assert!(found.lower <= exact + 0.04 && (found.upper - exact).abs() < 0.04, "{context}");
+    }
 }
 
 /// Things without thickness inside a solid, and points that are balls.

@@ -10,14 +10,16 @@ use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
 
 type Vector = Vector3<f64>;
 
-/// Scans sheets of 2 × 2, given by the two directions along each from the middle of its lower edge, with a
-/// spacing of 0.05.
-fn sheets(of: &[[Vector; 2]]) -> PointHierarchy {
+const ZERO: Vector = Vector::new(0.0, 0.0, 0.0);
+
+/// Scans sheets of 2 × 2, given by the middle of an edge and the two directions along each, with a spacing of
+/// 0.05.
+fn sheets(of: &[[Vector; 3]]) -> PointHierarchy {
     let steps = |n: u32| (0..=n).map(|i| 0.05 * f64::from(i));
     let points: Vec<[f64; 3]> = of
         .iter()
-        .flat_map(|[side, up]| {
-            steps(40).flat_map(move |a| steps(40).map(move |b| (side * (a - 1.0) + up * b).into()))
+        .flat_map(|[from, side, up]| {
+            steps(40).flat_map(move |a| steps(40).map(move |b| (from + side * (a - 1.0) + up * b).into()))
         })
         .collect();
     PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
@@ -39,10 +41,10 @@ fn follow(scan: &PointHierarchy, radius: f64, centres: &[[f64; 3]]) -> Vec<Vec<S
 /// A ball that touched one side of a groove stays inside the groove when it touches the other one.
 #[test]
 fn a_contact_does_not_decide_about_another_sheet() {
-    for half_angle in [30.0_f64, 45.0, 60.0] {
+    for half_angle in [15.0_f64, 20.0, 30.0, 45.0, 60.0] {
         let (sin, cos) = half_angle.to_radians().sin_cos();
         let (left, right) = (Vector::new(-sin, 0.0, cos), Vector::new(sin, 0.0, cos));
-        let scan = sheets(&[[Vector::y(), left], [Vector::y(), right]]);
+        let scan = sheets(&[[ZERO, Vector::y(), left], [ZERO, Vector::y(), right]]);
         // Both sides are `radius` away from the middle.
         let radius = 0.1;
         let at = |x: f64| [x / cos, 0.0, radius / sin];
@@ -56,10 +58,25 @@ fn a_contact_does_not_decide_about_another_sheet() {
     }
 }
 
+/// A ball between a floor and a ceiling is pushed away from both.
+#[test]
+fn a_contact_with_the_floor_does_not_decide_about_the_ceiling() {
+    let ceiling = Vector::new(0.0, 0.0, 0.15);
+    let scan = sheets(&[[ZERO, Vector::y(), Vector::x()], [ceiling, Vector::y(), Vector::x()]]);
+    let found = follow(&scan, 0.08, &[[1.0, 0.0, 0.065], [1.0, 0.0, 0.075], [1.0, 0.0, 0.085]]);
+    for (contacts, [up, down]) in found.iter().zip([[0.015, -1.0], [0.005, 0.005], [-1.0, 0.015]]) {
+        for contact in contacts {
+            let depth = if contact.normal[2] > 0.9 { up } else { down };
+            assert!((contact.depth - depth).abs() < 4e-3, "{depth}: {contacts:?}");
+        }
+        assert!(!contacts.is_empty(), "it touches");
+    }
+}
+
 /// A ball whose centre sinks below the floor is still pushed up, also while it touches a wall.
 #[test]
 fn a_contact_with_a_wall_leaves_the_floor_its_side() {
-    let scan = sheets(&[[Vector::y(), Vector::x()], [Vector::y(), Vector::z()]]);
+    let scan = sheets(&[[ZERO, Vector::y(), Vector::x()], [ZERO, Vector::y(), Vector::z()]]);
     let found = follow(&scan, 0.2, &[[0.19, 0.0, 0.19], [0.19, 0.0, 0.1], [0.19, 0.0, -0.001]]);
     for (contacts, depth) in found.iter().zip([0.01, 0.1, 0.201]) {
         let along = |k: usize| {
@@ -74,7 +91,7 @@ fn a_contact_with_a_wall_leaves_the_floor_its_side() {
 /// Moved by the depth of a contact with a ball that is inside its core, a shape is out of the ball.
 #[test]
 fn contacts_with_balls_inside_a_shape_lead_out() {
-    let scan = sheets(&[[Vector::y(), Vector::x()]]);
+    let scan = sheets(&[[ZERO, Vector::y(), Vector::x()]]);
     let rng = &mut rng(8102);
     let ball = 0.02;
     let options = CollideOptions::default().with_semantics(Semantics::Thickened(ball));
@@ -101,4 +118,16 @@ fn contacts_with_balls_inside_a_shape_lead_out() {
         }
     }
     assert!(inside > 1000, "{inside} centres inside");
+    // Across a core that is flat, not along it.
+    let ends = [[0.5, 0.0, 0.0], [1.5, 0.0, 0.0]];
+    let corners = [[0.5, 0.0, 0.0], [1.5, 0.0, 0.0], [1.0, 0.5, 0.0]];
+    let (radius, pose) = (0.01, Pose::from_translation([1.0, 0.0, 0.0]));
+    for shape in [
+        Shape::Capsule { ends, radius },
+        Shape::Triangle { points: corners, radius },
+        Shape::Box { pose, half: [0.3, 0.3, 0.0], radius },
+    ] {
+        target.contacts(&shape, &mut contacts, &mut scratch);
+        assert!((contacts[0].depth - radius - ball).abs() < 1e-9, "{shape:?}: {contacts:?}");
+    }
 }

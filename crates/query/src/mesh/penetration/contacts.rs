@@ -33,7 +33,7 @@ impl PairVisitor for Gathering<'_, '_> {
             let normals = contact.normals.map(|n| n.map_or(Vector::zeros(), |n| pose.rotate(n).into()));
             let depth = triangle_depth(&a, &b).0 * pose.scale();
             let point = pose.apply(contact.point).into();
-            self.survey.add(Surveyed { point, normals, depth: 0.0 }, depth);
+            self.survey.add(Surveyed { point, normals, depths: [0.0; 2] }, depth);
         }
         self.pair.meter.go_on()
     }
