@@ -284,8 +284,8 @@ fn shapes_in_a_solid() {
     assert_eq!(ask(f64::NAN, SOLID).upper, f64::INFINITY);
 }
 
-/// Balls that nearly fill a hollow one: the way back into it is of little more than one length. Its normals may
-/// point outwards, so that contacts are behind the surface.
+/// Balls that nearly fill a hollow one: the way back into it is of little more than one length. Its normals
+/// may point outwards, so that contacts are behind the surface.
 #[test]
 fn large_shapes_in_a_hollow_ball() {
     let ball = prepare(sphere(1.0), 0.0);
