@@ -80,6 +80,8 @@ impl<C: Course> Sweeping<'_, C> {
     ) -> Result<Option<Hit>, SweepReason> {
         let screws = self.screws(k);
         let clearance = self.plan.options().clearance;
+        // The radius of the smaller thing with all that counts as contact.
+        let size = self.size() + self.plan.thickness().unwrap_or(0.0) + clearance;
         loop {
             let answer = self.touches(&screws, within);
             let gap = match answer.verdict {
@@ -94,9 +96,7 @@ impl<C: Course> Sweeping<'_, C> {
             if within >= length {
                 return Ok(None);
             }
-            // What counts as contact is wider by these.
-            let wider = clearance + self.plan.thickness().unwrap_or(0.0);
-            let way = (gap - clearance).max(least_step(self.nearest.band, self.size() + wider));
+            let way = (gap - clearance).max(least_step(self.nearest.band, size));
             let next = within + way / self.speed(&screws, within);
             // A speed of zero leads to the end at once.
             within = if next < length && next > within { next } else { length };

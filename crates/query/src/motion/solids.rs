@@ -74,7 +74,7 @@ pub(crate) fn sweep(
         Outcome::Told(verdict) => verdict,
         Outcome::Hit { t_free, apart, t_hit } => {
             let t_hit = course.first_touch(apart, t_hit);
-            let (moved, frame) = course.placed(t_hit);
+            let (moved, frame) = course.placed(&motion.at(t_hit));
             let solid = Solid::new(&moved, &frame);
             contacts(elements, solid.as_ref(), None, found, (level, &mut *course.scratch, candidates));
             match (found.first(), course.at(t_hit)) {
@@ -116,13 +116,13 @@ enum Outcome {
 }
 
 impl<'s> Course<'s, '_> {
-    /// The shape at a time, and the stored frame of the scan relative to it. Hulls and shapes of the
+    /// The shape at a pose, and the stored frame of the scan relative to it. Hulls and shapes of the
     /// caller's own borrow their places, so the frame moves past them instead.
-    fn placed(&self, time: f64) -> (Shape<'s>, Pose) {
-        let (at, frame) = (self.motion.at(time), *self.elements.placed.stored_to_world());
-        match self.shape.moved(&at) {
+    fn placed(&self, at: &Pose) -> (Shape<'s>, Pose) {
+        let frame = *self.elements.placed.stored_to_world();
+        match self.shape.moved(at) {
             Some(moved) => (moved, frame),
-            None => (*self.shape, frame.relative_to(&at)),
+            None => (*self.shape, frame.relative_to(at)),
         }
     }
 
@@ -132,7 +132,7 @@ impl<'s> Course<'s, '_> {
         if !is_proper(&at) {
             return Err(SweepReason::Pose);
         }
-        let (moved, frame) = self.placed(time);
+        let (moved, frame) = self.placed(&at);
         let solid = Solid::new(&moved, &frame).ok_or(SweepReason::Shape)?;
         self.distances += 1;
         // Without any disc or ball, nothing is known.
@@ -146,11 +146,6 @@ impl<'s> Course<'s, '_> {
         Ok(ShapeDistance { lower: lower.max(0.0), ..found })
     }
 
-    /// The radius of the shape, in the world.
-    fn size(&self) -> f64 {
-        self.ball.1 * self.motion.at(0.0).scale()
-    }
-
     /// A bound on the speed of any point of the shape: along a screw each has a constant speed.
     fn speed(&self, screw: &Screw) -> f64 {
         let start = screw.start();
@@ -161,6 +156,10 @@ impl<'s> Course<'s, '_> {
 
     fn run(&mut self) -> Outcome {
         let duration = self.motion.duration();
+        // The radius of the shape with all that counts as contact, in the world.
+        let size = self.ball.1 * self.motion.at(0.0).scale()
+            + self.elements.beyond_boxes() * self.elements.scale()
+            + self.clearance;
         let (mut time, mut apart) = (0.0, 0.0);
         // The time up to which the motion is proven free, and `true` while the proof goes on.
         let (mut proven, mut goes_on) = (0.0_f64, true);
@@ -198,9 +197,7 @@ impl<'s> Course<'s, '_> {
             let is_near = left <= LEFT * found.band;
             // No disc or ball is nearer than the upper bound.
             let free = STEP * (found.upper - self.clearance);
-            let wider = self.clearance + self.elements.beyond_boxes() * self.elements.scale();
-            let least_way = least_step(found.band, self.size() + wider);
-            let way = if is_near { free.max(least_way) } else { STEP * left };
+            let way = if is_near { free.max(least_step(found.band, size)) } else { STEP * left };
             let next = time + way / speed;
             // What is left of the proof may reach the end of the motion.
             goes_on &= proven >= duration || !is_near && (next > time || speed == 0.0);

@@ -105,7 +105,7 @@ fn deepest_share(from: &Vector, way: &Vector, fall: f64, [disc, radius]: [f64; 2
         if away_sq >= low_sq {
             return 1.0;
         }
-        // What is under the root, times e²: so a step takes one root and one division.
+        // The radicand times e², so that a step takes one root and one division.
         let slope_sq = fall_sq * away_sq + square * way_sq;
         let slope = slope_sq.sqrt();
         let step = ((disc - away) * slope + pull * away) * slope_sq / (slope_sq * slope + bend);
