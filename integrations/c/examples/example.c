@@ -2,6 +2,7 @@
 #include <nearmiss.h>
 
 #include <stdio.h>
+#include <string.h>
 
 #define TRY(call)                                                   \
     do {                                                            \
@@ -15,6 +16,11 @@ int main(int argc, char **argv) {
     if (argc != 2) {
         fprintf(stderr, "usage: example SCAN\n");
         return 2;
+    }
+    /* At start-up: the library must have the version of the header. */
+    if (strcmp(nearmiss_version(), NEARMISS_VERSION) != 0) {
+        fprintf(stderr, "error: expected nearmiss " NEARMISS_VERSION ", got %s\n", nearmiss_version());
+        return 1;
     }
     /* Once: prepare the scan, save it, open it by mapping the file. */
     NearmissScan *prepared, *scan;

@@ -10,6 +10,14 @@
 #include <stdint.h>
 
 /*
+ The version of this header. That of the library must be the same: see `nearmiss_version`.
+ */
+#define NEARMISS_VERSION "0.1.0"
+#define NEARMISS_VERSION_MAJOR 0
+#define NEARMISS_VERSION_MINOR 1
+#define NEARMISS_VERSION_PATCH 0
+
+/*
  The outcome of a function. `nearmiss_last_error` tells more about all but OK.
  */
 enum NearmissStatus
@@ -1209,7 +1217,8 @@ extern "C" {
 const char *nearmiss_last_error(void);
 
 /*
- Returns the version of the library, such as "0.1.0". Thread safety: any thread.
+ Returns the version of the library, such as "0.1.0". Compare it with `NEARMISS_VERSION`, which is that of
+ the header, before the first other call: structs may differ between versions. Thread safety: any thread.
  */
 const char *nearmiss_version(void);
 

@@ -87,7 +87,8 @@ pub extern "C" fn nearmiss_last_error() -> *const c_char {
     LAST.with(|last| last.borrow().as_ptr())
 }
 
-/// Returns the version of the library, such as "0.1.0". Thread safety: any thread.
+/// Returns the version of the library, such as "0.1.0". Compare it with `NEARMISS_VERSION`, which is that of
+/// the header, before the first other call: structs may differ between versions. Thread safety: any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_version() -> *const c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()

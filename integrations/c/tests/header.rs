@@ -2,10 +2,24 @@
 
 use std::path::Path;
 
+/// The version of the header, which is that of the package.
+const VERSION: &str = concat!(
+    "\n/*\n The version of this header. That of the library must be the same: see `nearmiss_version`.\n */",
+    "\n#define NEARMISS_VERSION \"",
+    env!("CARGO_PKG_VERSION"),
+    "\"\n#define NEARMISS_VERSION_MAJOR ",
+    env!("CARGO_PKG_VERSION_MAJOR"),
+    "\n#define NEARMISS_VERSION_MINOR ",
+    env!("CARGO_PKG_VERSION_MINOR"),
+    "\n#define NEARMISS_VERSION_PATCH ",
+    env!("CARGO_PKG_VERSION_PATCH"),
+);
+
 #[test]
 fn the_header_is_that_of_the_sources() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("the configuration");
+    let mut config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("the configuration");
+    config.after_includes = Some(VERSION.to_owned());
     let bindings = cbindgen::Builder::new().with_crate(root).with_config(config).generate();
     let mut made = Vec::new();
     bindings.expect("sources that cbindgen reads").write(&mut made);
