@@ -647,7 +647,7 @@ typedef struct NearmissManifoldPoint {
 } NearmissManifoldPoint;
 
 /*
- The places for a list, and the number of entries there are.
+ The places for a list, and the number of entries there are. Fields that are written need no value before.
  */
 typedef struct NearmissManifoldList {
     /*
@@ -695,7 +695,7 @@ typedef struct NearmissContact {
 } NearmissContact;
 
 /*
- The places for a list, and the number of entries there are.
+ The places for a list, and the number of entries there are. Fields that are written need no value before.
  */
 typedef struct NearmissContactList {
     /*
@@ -711,7 +711,7 @@ typedef struct NearmissContactList {
      */
     size_t count;
     /*
-     Written: true if the budget did not end the search.
+     Written: true if the budget did not end the search, so that the list has all contacts.
      */
     bool complete;
 } NearmissContactList;

@@ -48,7 +48,7 @@ pub extern "C" fn nearmiss_collide(
     })
 }
 
-/// The places for a list, and the number of entries there are.
+/// The places for a list, and the number of entries there are. Fields that are written need no value before.
 #[derive(Debug)]
 #[repr(C)]
 pub struct ManifoldList {
@@ -57,10 +57,10 @@ pub struct ManifoldList {
     /// The number of places.
     pub capacity: usize,
     /// Written: the number of points, which may exceed the capacity. The first ones are written.
-    pub count: usize,
+    pub count: MaybeUninit<usize>,
 }
 
-/// The places for a list, and the number of entries there are.
+/// The places for a list, and the number of entries there are. Fields that are written need no value before.
 #[derive(Debug)]
 #[repr(C)]
 pub struct ContactList {
@@ -69,9 +69,9 @@ pub struct ContactList {
     /// The number of places.
     pub capacity: usize,
     /// Written: the number of contacts, which may exceed the capacity. The first ones are written.
-    pub count: usize,
-    /// Written: true if the budget did not end the search.
-    pub complete: bool,
+    pub count: MaybeUninit<usize>,
+    /// Written: true if the budget did not end the search, so that the list has all contacts.
+    pub complete: MaybeUninit<bool>,
 }
 
 /// Like `nearmiss_collide`, and writes up to eight contact points for a physics solver to `list`. The
@@ -100,11 +100,9 @@ pub unsafe extern "C" fn nearmiss_manifold(
             question = question.hinted(get_mut(hint, "hint")?);
         }
         let answer = question.collide(plan, &mut memory.scratch);
-        let mut count = MaybeUninit::uninit();
         let points = memory.manifold.iter().map(ManifoldPoint::new);
         // SAFETY: the caller promises the places of the list.
-        unsafe { fill(points, (list.points, list.capacity), Some(&mut count)) }?;
-        list.count = memory.manifold.len();
+        unsafe { fill(points, (list.points, list.capacity), Some(&mut list.count)) }?;
         write(out, Answer::new(&answer))
     })
 }
@@ -129,11 +127,10 @@ pub unsafe extern "C" fn nearmiss_contacts(
         let (pair, memory) = (pair(a, b, limits)?, get_mut(scratch, "scratch")?);
         let list = list.ok_or_else(|| Failure::null("list"))?;
         let answer = pair.contacts(&mut memory.contacts).collide(plan, &mut memory.scratch);
-        let mut count = MaybeUninit::uninit();
+        list.complete.write(memory.contacts.complete);
         let contacts = memory.contacts.contacts.iter().map(Contact::new);
         // SAFETY: the caller promises the places of the list.
-        unsafe { fill(contacts, (list.contacts, list.capacity), Some(&mut count)) }?;
-        (list.count, list.complete) = (memory.contacts.contacts.len(), memory.contacts.complete);
+        unsafe { fill(contacts, (list.contacts, list.capacity), Some(&mut list.count)) }?;
         write(out, Answer::new(&answer))
     })
 }

@@ -25,7 +25,7 @@ const fn most<T>() -> usize {
 }
 
 /// Refuses a pointer to `count` values that is not aligned, or too many values.
-fn check<T>(first: *const T, count: usize, name: &str) -> Result<(), Failure> {
+pub(crate) fn check<T>(first: *const T, count: usize, name: &str) -> Result<(), Failure> {
     if count > most::<T>() {
         return Err(Failure::argument(format_args!(
             "expected at most {} values for {name}, got {count}",

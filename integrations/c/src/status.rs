@@ -58,7 +58,8 @@ thread_local! {
 fn keep(failure: Failure) -> Status {
     let Failure { status, mut message } = failure;
     message.retain(|c| c != '\0');
-    LAST.with(|last| *last.borrow_mut() = CString::new(message).unwrap_or_default());
+    // A thread that ends keeps no message.
+    let _kept = LAST.try_with(|last| *last.borrow_mut() = CString::new(message).unwrap_or_default());
     status
 }
 
@@ -84,7 +85,7 @@ pub(crate) fn guard(work: impl FnOnce() -> Result<(), Failure>) -> Status {
 /// The text is UTF-8 and valid until the next failure on this thread. Thread safety: any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_last_error() -> *const c_char {
-    LAST.with(|last| last.borrow().as_ptr())
+    LAST.try_with(|last| last.borrow().as_ptr()).unwrap_or(c"".as_ptr())
 }
 
 /// Returns the version of the library, such as "0.1.0". Compare it with `NEARMISS_VERSION`, which is that of

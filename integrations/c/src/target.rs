@@ -9,7 +9,7 @@ use crate::handle::{get, get_mut};
 use crate::hint::ShapeHint;
 use crate::options::Evidence;
 use crate::plan::Plan;
-use crate::pointer::{fill, required, slice};
+use crate::pointer::{check, fill, required, slice};
 use crate::pose::Placed;
 use crate::scratch::Scratch;
 use crate::shape::Shape;
@@ -225,8 +225,11 @@ unsafe fn each<Q, A>(
     out: *mut A,
     mut ask: impl FnMut(&Q) -> Result<A, Failure>,
 ) -> Result<(), Failure> {
-    if !questions.is_empty() && out.is_null() {
-        return Err(Failure::null("out"));
+    if !questions.is_empty() {
+        if out.is_null() {
+            return Err(Failure::null("out"));
+        }
+        check(out, questions.len(), "out")?;
     }
     for (i, question) in questions.iter().enumerate() {
         let answer = ask(question)?;
@@ -254,7 +257,7 @@ pub unsafe extern "C" fn nearmiss_shape_distance(
     guard(|| {
         let (target, memory) = (target(plan, scan)?, get_mut(scratch, "scratch")?);
         if within.is_nan() || within < 0.0 {
-            return Err(Failure::argument(format_args!("expected a reach of at least 0, got {within}")));
+            return Err(Failure::argument(format_args!("expected `within` of at least 0, got {within}")));
         }
         // SAFETY: the caller promises shapes, their points and places.
         unsafe {

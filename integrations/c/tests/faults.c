@@ -122,6 +122,11 @@ static void handles(NearmissScan *scan) {
     FAILS(nearmiss_touch(plan, &a, shapes, 1, scratch, &touched), NEARMISS_STATUS_ARGUMENT, "got 99");
     FAILS(nearmiss_touch(plan, &a, NULL, 1, scratch, &touched), NEARMISS_STATUS_NULL, "shapes");
     OK(nearmiss_touch(plan, &a, NULL, 0, scratch, NULL));
+    FAILS(nearmiss_touch(plan, &a, shapes, 1, scratch, NULL), NEARMISS_STATUS_NULL, "out");
+    NearmissShapeAnswer *odd = (NearmissShapeAnswer *)((char *)&touched + 1);
+    FAILS(nearmiss_touch(plan, &a, shapes, 1, scratch, odd), NEARMISS_STATUS_ARGUMENT, "aligned to 8 bytes for out");
+    NearmissShapeDistance apart;
+    FAILS(nearmiss_shape_distance(plan, &a, shapes, 1, NAN, scratch, &apart), NEARMISS_STATUS_ARGUMENT, "`within`");
     NearmissRay ray = {{0, 0, 1}, {0, 0, 0}, INFINITY, 0};
     NearmissRayHit hit;
     FAILS(nearmiss_cast(plan, &a, &ray, 1, scratch, &hit), NEARMISS_STATUS_ARGUMENT, "direction other than 0");

@@ -50,7 +50,8 @@ static void pairs(void) {
     OK(nearmiss_hint_free(hint));
 
     NearmissContact some[2];
-    NearmissContactList contacts = {some, 2, 0, false};
+    NearmissContactList contacts;
+    contacts.contacts = some, contacts.capacity = 2;
     OK(nearmiss_contacts(plan, &low, &cross, NULL, scratch, &contacts, &answer));
     CHECK(contacts.complete && contacts.count > 2 && fabs(some[1].point[2]) < 0.02);
 
