@@ -145,7 +145,7 @@ enum NearmissReason
      */
     NEARMISS_REASON_AMBIGUOUS = 3,
     /*
-     A pose or a shape is out of range.
+     A pose is out of range.
      */
     NEARMISS_REASON_RANGE = 4,
     /*
@@ -156,6 +156,14 @@ enum NearmissReason
      Another reason.
      */
     NEARMISS_REASON_OTHER = 6,
+    /*
+     A shape is out of range.
+     */
+    NEARMISS_REASON_SHAPE = 7,
+    /*
+     The kernel is geodesic, so nothing is proven about a motion.
+     */
+    NEARMISS_REASON_GEODESIC = 8,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

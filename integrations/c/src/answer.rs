@@ -28,12 +28,16 @@ pub enum Reason {
     Undersampled = 2,
     /// The points of one do not fit a single sheet there.
     Ambiguous = 3,
-    /// A pose or a shape is out of range.
+    /// A pose is out of range.
     Range = 4,
     /// They come nearer than can be proven apart.
     Near = 5,
     /// Another reason.
     Other = 6,
+    /// A shape is out of range.
+    Shape = 7,
+    /// The kernel is geodesic, so nothing is proven about a motion.
+    Geodesic = 8,
 }
 
 impl Reason {
@@ -42,7 +46,8 @@ impl Reason {
             Why::Budget { .. } => Self::Budget,
             Why::Undersampled => Self::Undersampled,
             Why::Ambiguous => Self::Ambiguous,
-            Why::Pose | Why::Shape => Self::Range,
+            Why::Pose => Self::Range,
+            Why::Shape => Self::Shape,
             _ => Self::Other,
         }
     }

@@ -103,6 +103,8 @@ impl SweepAnswer {
             SweepReason::Near => Reason::Near,
             SweepReason::Budget => Reason::Budget,
             SweepReason::Pose => Reason::Range,
+            SweepReason::Shape => Reason::Shape,
+            SweepReason::Geodesic => Reason::Geodesic,
             _ => Reason::Other,
         };
         Self { t_free, reason, ..self }
