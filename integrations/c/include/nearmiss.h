@@ -579,11 +579,11 @@ typedef struct NearmissAnswer {
      */
     NearmissReason reason;
     /*
-     The point of the first scan that shows the contact, as the input numbers it.
+     The point of the first scan that shows the contact, as the input numbers it; the triangle of a mesh.
      */
     uint32_t source_a;
     /*
-     The point of the second scan.
+     The point of the second scan, or the triangle of a mesh.
      */
     uint32_t source_b;
     /*
@@ -607,7 +607,8 @@ typedef struct NearmissAnswer {
      */
     double gap;
     /*
-     The length within which nothing is claimed about the scanned things themselves.
+     The length within which nothing is claimed about the scanned things themselves. Infinite if a pose or
+     a shape is out of range.
      */
     double band;
     /*
@@ -725,15 +726,16 @@ typedef struct NearmissContactList {
 } NearmissContactList;
 
 /*
- Bounds on a distance, in world units: lower ≤ distance ≤ upper.
+ Bounds on a distance, in world units: lower ≤ distance ≤ upper. If a pose is out of range, `lower` is 0,
+ `upper` and `band` are infinite, the places NaN and the points `UINT32_MAX`.
  */
 typedef struct NearmissDistance {
     /*
-     A proven lower bound.
+     A proven lower bound; 0 if nothing is known.
      */
     double lower;
     /*
-     An upper bound: the distance of the two points.
+     An upper bound: the distance of the two places; infinite if nothing is known.
      */
     double upper;
     /*
@@ -757,7 +759,7 @@ typedef struct NearmissDistance {
      */
     uint32_t source_b;
     /*
-     The certainty of the upper bound.
+     The certainty of the upper bound; none if it is infinite.
      */
     NearmissEvidence evidence;
     /*
@@ -835,15 +837,17 @@ typedef struct NearmissShapeAnswer {
 } NearmissShapeAnswer;
 
 /*
- Bounds on the distance of a shape and a scan. Infinite if nothing is within the reach.
+ Bounds on the distance of a shape and a scan: lower ≤ distance ≤ upper. If no disc or ball of the scan is
+ within the greatest distance asked for, or if a pose or the shape is out of range, `upper` is infinite,
+ places and `band` are NaN, and `source` is `UINT32_MAX`.
  */
 typedef struct NearmissShapeDistance {
     /*
-     A proven lower bound.
+     A proven lower bound. At most the distance asked for if `upper` is infinite; 0 if nothing is known.
      */
     double lower;
     /*
-     An upper bound: the distance of the two points.
+     An upper bound: the distance of the two places.
      */
     double upper;
     /*
@@ -863,7 +867,7 @@ typedef struct NearmissShapeDistance {
      */
     uint32_t source;
     /*
-     The certainty of the upper bound.
+     The certainty of the upper bound; none if it is infinite.
      */
     NearmissEvidence evidence;
 } NearmissShapeDistance;
@@ -964,7 +968,7 @@ typedef struct NearmissPenetration {
      */
     double band;
     /*
-     The certainty of the separation after that shift.
+     The certainty of the separation after that shift; none if there is no such shift.
      */
     NearmissEvidence evidence;
     /*
@@ -1187,7 +1191,8 @@ typedef struct NearmissBodyPair {
 } NearmissBodyPair;
 
 /*
- Bounds on the distance of two bodies. If it is not known, the bounds are infinite and the places NaN.
+ Bounds on the distance of two bodies: lower ≤ distance ≤ upper. If it is not known, `lower` is 0, `upper`
+ infinite, and the places are NaN.
  */
 typedef struct NearmissBodyDistance {
     /*
@@ -1196,11 +1201,11 @@ typedef struct NearmissBodyDistance {
      */
     struct NearmissBodyPair pair;
     /*
-     A proven lower bound.
+     A proven lower bound; 0 if nothing is known.
      */
     double lower;
     /*
-     An upper bound: the distance of the two points. 0 if the bodies touch.
+     An upper bound: the distance of the two places. 0 if the bodies touch; infinite if nothing is known.
      */
     double upper;
     /*
@@ -1211,6 +1216,15 @@ typedef struct NearmissBodyDistance {
      The nearest place on the second body.
      */
     double point_b[3];
+    /*
+     The certainty of the upper bound; none if it is infinite. Estimated for a scan and a shape, and for a
+     nearest pair with a scan.
+     */
+    NearmissEvidence evidence;
+    /*
+     True if the budget did not end the search; false if nothing is known.
+     */
+    bool complete;
 } NearmissBodyDistance;
 
 #ifdef __cplusplus
@@ -1610,8 +1624,9 @@ NearmissStatus nearmiss_touch(const struct NearmissPlan *plan,
                               struct NearmissShapeAnswer *out);
 
 /*
- Bounds the distance of each of `count` shapes and a scan, and writes `count` answers to `out`.
- Nothing further away than `within` is looked for. Thread safety: one call at a time for each scratch.
+ Bounds the distance of each of `count` shapes and a scan, and writes `count` answers to `out`. No disc or
+ ball further away than `within` is looked for, which saves time; infinite for no limit. Thread safety: one
+ call at a time for each scratch.
 
  # Safety
  `shapes` and `out` are `count` values; other pointers are null or valid.
@@ -1627,7 +1642,8 @@ NearmissStatus nearmiss_shape_distance(const struct NearmissPlan *plan,
 /*
  Writes the contacts of a shape with a scan to `out`, as many as its capacity holds, and their number,
  at most eight, to `count`. The first is the deepest; each of the others is the candidate furthest from
- all earlier ones. `hint` may be null. Thread safety: one call at a time for each scratch and each hint.
+ all earlier ones. There are none if the pose or the shape is out of range; `nearmiss_touch` is undecided
+ then. `hint` may be null. Thread safety: one call at a time for each scratch and each hint.
 
  # Safety
  `out` are `capacity` places; other pointers are null or valid.
@@ -1642,8 +1658,9 @@ NearmissStatus nearmiss_shape_contacts(const struct NearmissPlan *plan,
                                        size_t *count);
 
 /*
- Finds the first place where each of `count` rays hits a scan, and writes `count` answers to `out`.
- Thread safety: one call at a time for each scratch.
+ Finds the first place where each of `count` rays hits a scan, and writes `count` answers to `out`. If the
+ pose is out of range, it hits nothing, with estimated evidence. Thread safety: one call at a time for each
+ scratch.
 
  # Safety
  `rays` and `out` are `count` values; other pointers are null or valid.
@@ -1919,7 +1936,8 @@ NearmissStatus nearmiss_world_move(struct NearmissWorld *world,
 /*
  Writes the pairs of bodies that may meet under `plan` to `out`, as many as its capacity holds, in
  ascending order, and their whole number to `count`. With `id_count` above 0, only pairs with one of
- the bodies `ids`, such as those that have moved. Thread safety: one call at a time for each scratch.
+ the bodies `ids`, such as those that have moved; ids of no body are ignored. With an `id_count` of 0 all
+ pairs, also if no body has moved. Thread safety: one call at a time for each scratch.
 
  # Safety
  `ids` are `id_count` numbers, `out` are `capacity` places; other pointers are null or valid.
@@ -1936,9 +1954,12 @@ NearmissStatus nearmiss_world_near_pairs(const struct NearmissWorld *world,
 /*
  Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
  `nearmiss_touch` does, a scan and a mesh as two scans, and other pairs exactly. A mesh is its triangles
- without an inside. `hint` counts for two scans only, and `limits` for pairs without a shape. Answers
- about shapes and meshes have no normals. Thread safety: one call at a time for each scratch and each
- hint.
+ without an inside. `hint` counts for two scans only, and `limits` for pairs without a shape.
+
+ Answers about two scans, or a scan and a mesh, have all fields; the source of a mesh is its triangle.
+ Other answers have verdict, evidence, reason, witness, band and likelihood, and those about a scan and a
+ shape the source of the scan. Their remaining numbers are missing, and their work is 0. Thread safety: one
+ call at a time for each scratch and each hint.
  */
 NearmissStatus nearmiss_world_collide(const struct NearmissWorld *world,
                                       const struct NearmissPlan *plan,
@@ -1949,8 +1970,9 @@ NearmissStatus nearmiss_world_collide(const struct NearmissWorld *world,
                                       struct NearmissAnswer *out);
 
 /*
- Bounds the distance of two bodies: of two scans as `nearmiss_distance` does. Infinite for invalid poses.
- `limits` may be null. Thread safety: one call at a time for each scratch.
+ Bounds the distance of two bodies: of two scans as `nearmiss_distance` does. It is unknown if a pose or a
+ shape is out of range. `limits` may be null, and count for pairs without a shape. Thread safety: one call
+ at a time for each scratch.
  */
 NearmissStatus nearmiss_world_distance(const struct NearmissWorld *world,
                                        const struct NearmissPlan *plan,
@@ -1976,9 +1998,12 @@ NearmissStatus nearmiss_world_penetration(const struct NearmissWorld *world,
 
 /*
  Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`,
- which may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot.
- `lower` is at most `reach`, and a bound for all pairs that count. If none does, both ids are `UINT64_MAX`.
- Thread safety: one call at a time for each scratch.
+ which may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot. Pairs
+ with a pose or a shape out of range are left out, as their distance is unknown.
+
+ `lower` is at most `reach`, and a bound for all pairs that count. If nothing is found, both ids are
+ `UINT64_MAX`, `upper` is infinite, and `lower` is `reach`, or 0 if a pair was left out. Thread safety: one
+ call at a time for each scratch.
 
  # Safety
  `ignored` are `ignored_count` pairs; other pointers are null or valid.

@@ -79,9 +79,9 @@ pub struct Answer {
     pub evidence: Evidence,
     /// The reason if it is undecided.
     pub reason: Reason,
-    /// The point of the first scan that shows the contact, as the input numbers it.
+    /// The point of the first scan that shows the contact, as the input numbers it; the triangle of a mesh.
     pub source_a: u32,
-    /// The point of the second scan.
+    /// The point of the second scan, or the triangle of a mesh.
     pub source_b: u32,
     /// A place where both touch.
     pub witness: [f64; 3],
@@ -93,7 +93,8 @@ pub struct Answer {
     pub residual: f64,
     /// A proven lower bound of the distance, of a certified separation.
     pub gap: f64,
-    /// The length within which nothing is claimed about the scanned things themselves.
+    /// The length within which nothing is claimed about the scanned things themselves. Infinite if a pose or
+    /// a shape is out of range.
     pub band: f64,
     /// The probability of a contact, if the budget was spent.
     pub likelihood: f64,
@@ -127,6 +128,18 @@ impl Answer {
         }
     }
 
+    /// The same answer for this reason.
+    fn because(self, why: Why) -> Self {
+        let likelihood = if let Why::Budget { likelihood } = why { likelihood } else { NONE };
+        Self { reason: Reason::new(why), likelihood, ..self }
+    }
+
+    /// The same answer with both sides exchanged.
+    pub(crate) fn swapped(self) -> Self {
+        let Self { source_a, source_b, normal_a, normal_b, .. } = self;
+        Self { source_a: source_b, source_b: source_a, normal_a: normal_b, normal_b: normal_a, ..self }
+    }
+
     /// The answer about a scan and a shape.
     pub(crate) fn of_shape(answer: &nearmiss::ShapeAnswer, shape_is_first: bool) -> Self {
         let none = Self::undecided(Reason::None, answer.band);
@@ -140,7 +153,7 @@ impl Answer {
             ShapeVerdict::Separated { evidence: certainty } => {
                 Self { verdict: Verdict::Separated, evidence: evidence(certainty), ..none }
             }
-            ShapeVerdict::Undecided(why) => Self { reason: Reason::new(why), ..none },
+            ShapeVerdict::Undecided(why) => none.because(why),
         }
     }
 
@@ -154,7 +167,7 @@ impl Answer {
             BodyVerdict::Separated { evidence: certainty } => {
                 Self { verdict: Verdict::Separated, evidence: evidence(certainty), ..none }
             }
-            BodyVerdict::Undecided(why) => Self { reason: Reason::new(why), ..none },
+            BodyVerdict::Undecided(why) => none.because(why),
         }
     }
 
@@ -187,10 +200,7 @@ impl Answer {
                 let gap = if certainty == nearmiss::Evidence::Certified { gap } else { NONE };
                 Self { verdict: Verdict::Separated, evidence: evidence(certainty), gap, ..none }
             }
-            Found::Undecided(why) => {
-                let likelihood = if let Why::Budget { likelihood } = why { likelihood } else { NONE };
-                Self { reason: Reason::new(why), likelihood, ..none }
-            }
+            Found::Undecided(why) => none.because(why),
         }
     }
 }
@@ -244,13 +254,14 @@ impl ManifoldPoint {
     }
 }
 
-/// Bounds on a distance, in world units: lower ≤ distance ≤ upper.
+/// Bounds on a distance, in world units: lower ≤ distance ≤ upper. If a pose is out of range, `lower` is 0,
+/// `upper` and `band` are infinite, the places NaN and the points `UINT32_MAX`.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct Distance {
-    /// A proven lower bound.
+    /// A proven lower bound; 0 if nothing is known.
     pub lower: f64,
-    /// An upper bound: the distance of the two points.
+    /// An upper bound: the distance of the two places; infinite if nothing is known.
     pub upper: f64,
     /// The nearest place on the first scan.
     pub point_a: [f64; 3],
@@ -262,7 +273,7 @@ pub struct Distance {
     pub source_a: u32,
     /// The point of the second scan near its place.
     pub source_b: u32,
-    /// The certainty of the upper bound.
+    /// The certainty of the upper bound; none if it is infinite.
     pub evidence: Evidence,
     /// True if the budget did not end the search.
     pub complete: bool,
@@ -270,18 +281,13 @@ pub struct Distance {
 
 impl Distance {
     pub(crate) fn new(distance: &nearmiss::Distance) -> Self {
-        let ([point_a, point_b], [source_a, source_b]) =
-            (distance.points, distance.sources.map(|source| source.0));
-        Self {
-            lower: distance.lower,
-            upper: distance.upper,
-            point_a,
-            point_b,
-            band: distance.band,
-            source_a,
-            source_b,
-            evidence: evidence(distance.evidence),
-            complete: distance.complete,
-        }
+        let &nearmiss::Distance { lower, upper, band, complete, .. } = distance;
+        // Without an upper bound, the library returns any two points.
+        let is_known = upper.is_finite();
+        let [point_a, point_b] = if is_known { distance.points } else { [NOWHERE; 2] };
+        let [source_a, source_b] =
+            if is_known { distance.sources.map(|source| source.0) } else { [NOBODY; 2] };
+        let evidence = if is_known { evidence(distance.evidence) } else { Evidence::None };
+        Self { lower, upper, point_a, point_b, band, source_a, source_b, evidence, complete }
     }
 }

@@ -44,7 +44,7 @@ pub struct Penetration {
     pub direction: [f64; 3],
     /// The length within which nothing is claimed about the scanned things themselves.
     pub band: f64,
-    /// The certainty of the separation after that shift.
+    /// The certainty of the separation after that shift; none if there is no such shift.
     pub evidence: Evidence,
     /// True if the budget did not end the search.
     pub complete: bool,
@@ -54,7 +54,8 @@ impl Penetration {
     pub(crate) fn new(found: &nearmiss::Penetration) -> Self {
         let &nearmiss::Penetration { lower, upper, direction, evidence: certainty, band, complete, .. } =
             found;
-        Self { lower, upper, direction, band, evidence: evidence(certainty), complete }
+        let evidence = if upper.is_finite() { evidence(certainty) } else { Evidence::None };
+        Self { lower, upper, direction, band, evidence, complete }
     }
 }
 

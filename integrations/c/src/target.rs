@@ -2,7 +2,7 @@
 
 use std::mem::MaybeUninit;
 
-use nearmiss::{ShapeVerdict, Target};
+use nearmiss::{Shape as Convex, ShapeVerdict, Target};
 
 use crate::answer::{NOBODY, NONE, NOWHERE, Reason, Verdict, evidence};
 use crate::handle::{get, get_mut};
@@ -33,13 +33,15 @@ pub struct ShapeAnswer {
     pub band: f64,
 }
 
-/// Bounds on the distance of a shape and a scan. Infinite if nothing is within the reach.
+/// Bounds on the distance of a shape and a scan: lower ≤ distance ≤ upper. If no disc or ball of the scan is
+/// within the greatest distance asked for, or if a pose or the shape is out of range, `upper` is infinite,
+/// places and `band` are NaN, and `source` is `UINT32_MAX`.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct ShapeDistance {
-    /// A proven lower bound.
+    /// A proven lower bound. At most the distance asked for if `upper` is infinite; 0 if nothing is known.
     pub lower: f64,
-    /// An upper bound: the distance of the two points.
+    /// An upper bound: the distance of the two places.
     pub upper: f64,
     /// The nearest place on the scan.
     pub point: [f64; 3],
@@ -49,7 +51,7 @@ pub struct ShapeDistance {
     pub band: f64,
     /// The nearest point, as the input numbers it.
     pub source: u32,
-    /// The certainty of the upper bound.
+    /// The certainty of the upper bound; none if it is infinite.
     pub evidence: Evidence,
 }
 
@@ -123,18 +125,20 @@ impl ShapeAnswer {
 }
 
 impl ShapeDistance {
-    fn new(distance: Option<&nearmiss::ShapeDistance>) -> Self {
-        let Some(distance) = distance else {
-            return Self {
-                lower: f64::INFINITY,
-                upper: f64::INFINITY,
-                point: NOWHERE,
-                point_of_shape: NOWHERE,
-                band: NONE,
-                source: NOBODY,
-                evidence: Evidence::None,
-            };
-        };
+    /// No disc or ball was found, and this lower bound is known.
+    fn beyond(lower: f64) -> Self {
+        Self {
+            lower,
+            upper: f64::INFINITY,
+            point: NOWHERE,
+            point_of_shape: NOWHERE,
+            band: NONE,
+            source: NOBODY,
+            evidence: Evidence::None,
+        }
+    }
+
+    fn new(distance: &nearmiss::ShapeDistance) -> Self {
         let [point, point_of_shape] = distance.points;
         Self {
             lower: distance.lower,
@@ -239,8 +243,9 @@ unsafe fn each<Q, A>(
     Ok(())
 }
 
-/// Bounds the distance of each of `count` shapes and a scan, and writes `count` answers to `out`.
-/// Nothing further away than `within` is looked for. Thread safety: one call at a time for each scratch.
+/// Bounds the distance of each of `count` shapes and a scan, and writes `count` answers to `out`. No disc or
+/// ball further away than `within` is looked for, which saves time; infinite for no limit. Thread safety: one
+/// call at a time for each scratch.
 ///
 /// # Safety
 /// `shapes` and `out` are `count` values; other pointers are null or valid.
@@ -262,16 +267,53 @@ pub unsafe extern "C" fn nearmiss_shape_distance(
         // SAFETY: the caller promises shapes, their points and places.
         unsafe {
             each(slice(shapes, count, "shapes")?, out, |shape| {
-                let distance = target.distance(&shape.checked()?, within, &mut memory.scratch);
-                Ok(ShapeDistance::new(distance.as_ref()))
+                let (shape, scratch) = (shape.checked()?, &mut memory.scratch);
+                Ok(match target.distance(&shape, within, scratch) {
+                    Some(distance) => ShapeDistance::new(&distance),
+                    None => ShapeDistance::beyond(least_beyond(&target, &shape, within, scratch)),
+                })
             })
         }
     })
 }
 
+/// Returns a proven lower bound, at most `within`, of the distance of a shape and a scan without any disc or
+/// ball within `within`. The obstacle may come a little nearer than its discs. 0 if nothing is known.
+fn least_beyond(
+    target: &Target<'_>,
+    shape: &Convex<'_>,
+    within: f64,
+    scratch: &mut nearmiss::Scratch,
+) -> f64 {
+    if within == f64::INFINITY {
+        return 0.0;
+    }
+    let grown = grown(*shape, within).map(|grown| target.touch(&grown, scratch).verdict);
+    if let Some(ShapeVerdict::Separated { evidence: nearmiss::Evidence::Certified }) = grown {
+        return within;
+    }
+    target.distance(shape, f64::INFINITY, scratch).map_or(0.0, |found| found.lower.min(within))
+}
+
+/// Returns all within `by` of a shape. `None` if that is out of range.
+fn grown(mut shape: Convex<'_>, by: f64) -> Option<Convex<'_>> {
+    match &mut shape {
+        Convex::Sphere { radius, .. }
+        | Convex::Capsule { radius, .. }
+        | Convex::Box { radius, .. }
+        | Convex::Cylinder { rounding: radius, .. }
+        | Convex::Cone { rounding: radius, .. }
+        | Convex::Triangle { radius, .. }
+        | Convex::Hull { radius, .. } => *radius = (*radius + by).next_up(),
+        _ => return None,
+    }
+    Some(shape).filter(|grown| grown.rounding().is_finite())
+}
+
 /// Writes the contacts of a shape with a scan to `out`, as many as its capacity holds, and their number,
 /// at most eight, to `count`. The first is the deepest; each of the others is the candidate furthest from
-/// all earlier ones. `hint` may be null. Thread safety: one call at a time for each scratch and each hint.
+/// all earlier ones. There are none if the pose or the shape is out of range; `nearmiss_touch` is undecided
+/// then. `hint` may be null. Thread safety: one call at a time for each scratch and each hint.
 ///
 /// # Safety
 /// `out` are `capacity` places; other pointers are null or valid.
@@ -304,8 +346,9 @@ pub unsafe extern "C" fn nearmiss_shape_contacts(
     })
 }
 
-/// Finds the first place where each of `count` rays hits a scan, and writes `count` answers to `out`.
-/// Thread safety: one call at a time for each scratch.
+/// Finds the first place where each of `count` rays hits a scan, and writes `count` answers to `out`. If the
+/// pose is out of range, it hits nothing, with estimated evidence. Thread safety: one call at a time for each
+/// scratch.
 ///
 /// # Safety
 /// `rays` and `out` are `count` values; other pointers are null or valid.

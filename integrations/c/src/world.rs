@@ -2,13 +2,13 @@
 
 use std::mem::MaybeUninit;
 
-use nearmiss::{Bodies, Body, BodyId, BodyInterior};
+use nearmiss::{Bodies, Body, BodyId, BodyInterior, DistancePlan, MeshScanPlan};
 
-use crate::answer::{Answer, NOWHERE};
+use crate::answer::{Answer, Distance, NOWHERE};
 use crate::handle::{Handle, free, get, get_mut, make, opaque};
 use crate::hint::Hint;
 use crate::mesh::Mesh;
-use crate::options::{Budget, budget};
+use crate::options::{Budget, Evidence, budget};
 use crate::penetration::{Penetration, Solids, interiors};
 use crate::plan::Plan;
 use crate::pointer::{fill, required, slice, write};
@@ -39,31 +39,89 @@ pub struct BodyPair {
     pub b: u64,
 }
 
-/// Bounds on the distance of two bodies. If it is not known, the bounds are infinite and the places NaN.
+/// Bounds on the distance of two bodies: lower ≤ distance ≤ upper. If it is not known, `lower` is 0, `upper`
+/// infinite, and the places are NaN.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct BodyDistance {
     /// The ids of the bodies: in the order of the caller, or for a nearest pair the smaller one first. Both
     /// are `UINT64_MAX` if no pair counts.
     pub pair: BodyPair,
-    /// A proven lower bound.
+    /// A proven lower bound; 0 if nothing is known.
     pub lower: f64,
-    /// An upper bound: the distance of the two points. 0 if the bodies touch.
+    /// An upper bound: the distance of the two places. 0 if the bodies touch; infinite if nothing is known.
     pub upper: f64,
     /// The nearest place on the first body.
     pub point_a: [f64; 3],
     /// The nearest place on the second body.
     pub point_b: [f64; 3],
+    /// The certainty of the upper bound; none if it is infinite. Estimated for a scan and a shape, and for a
+    /// nearest pair with a scan.
+    pub evidence: Evidence,
+    /// True if the budget did not end the search; false if nothing is known.
+    pub complete: bool,
 }
 
 impl BodyDistance {
-    fn new(pair: BodyPair, lower: f64, upper: f64, [point_a, point_b]: [[f64; 3]; 2]) -> Self {
-        Self { pair, lower, upper, point_a, point_b }
+    /// The distance of a pair of which one body at least is a scan.
+    fn of_scans(pair: BodyPair, found: &nearmiss::Distance) -> Self {
+        let Distance { lower, upper, point_a, point_b, evidence, complete, .. } = Distance::new(found);
+        Self { pair, lower, upper, point_a, point_b, evidence, complete }
     }
 
-    /// Nothing is known about the distance.
-    fn unknown(pair: BodyPair) -> Self {
-        Self::new(pair, f64::INFINITY, f64::INFINITY, [NOWHERE; 2])
+    /// These bounds and places, found without a budget.
+    fn found(pair: BodyPair, [lower, upper]: [f64; 2], [point_a, point_b]: [[f64; 3]; 2]) -> Self {
+        Self { pair, lower, upper, point_a, point_b, evidence: Evidence::Certified, complete: true }
+    }
+
+    /// Nothing but a lower bound is known.
+    fn beyond(pair: BodyPair, lower: f64, complete: bool) -> Self {
+        let upper = f64::INFINITY;
+        Self { evidence: Evidence::None, complete, ..Self::found(pair, [lower, upper], [NOWHERE; 2]) }
+    }
+
+    /// The same distance, of which the upper bound proves nothing if `is_estimated`.
+    fn estimated(self, is_estimated: bool) -> Self {
+        Self { evidence: if is_estimated { Evidence::Estimated } else { self.evidence }, ..self }
+    }
+
+    /// The same distance with the places exchanged.
+    fn swapped(self) -> Self {
+        Self { point_a: self.point_b, point_b: self.point_a, ..self }
+    }
+
+    /// Bounds the distance of `bodies`, whose ids are `ids`.
+    fn between(
+        ids: BodyPair,
+        bodies: &nearmiss::BodyPair<'_>,
+        plan: &DistancePlan,
+        scratch: &mut nearmiss::Scratch,
+    ) -> Self {
+        use nearmiss::BodyPair::{MeshAndScan, Meshes, Scans, ShapeAndScan};
+        match bodies {
+            Scans(pair) => Self::of_scans(ids, &pair.distance(plan, scratch)),
+            MeshAndScan { pair, mesh_is_first } => {
+                let found = Self::of_scans(ids, &pair.distance(plan, scratch));
+                if *mesh_is_first { found.swapped() } else { found }
+            }
+            Meshes(pair) => {
+                let nearmiss::MeshDistance { lower, upper, points, complete, .. } =
+                    pair.distance(scratch.meshes());
+                let found = Self::found(ids, [lower, upper], points);
+                if upper.is_finite() {
+                    Self { complete, ..found }
+                } else {
+                    Self::beyond(ids, lower, complete)
+                }
+            }
+            other => match other.distance(plan, scratch) {
+                Some(nearmiss::BodyDistance { lower, upper, points }) => {
+                    let is_of_scan = matches!(other, ShapeAndScan { .. });
+                    Self::found(ids, [lower, upper], points).estimated(is_of_scan)
+                }
+                None => Self::beyond(ids, 0.0, false),
+            },
+        }
     }
 }
 
@@ -169,7 +227,8 @@ pub extern "C" fn nearmiss_world_move(world: Option<&mut World>, id: u64, pose: 
 
 /// Writes the pairs of bodies that may meet under `plan` to `out`, as many as its capacity holds, in
 /// ascending order, and their whole number to `count`. With `id_count` above 0, only pairs with one of
-/// the bodies `ids`, such as those that have moved. Thread safety: one call at a time for each scratch.
+/// the bodies `ids`, such as those that have moved; ids of no body are ignored. With an `id_count` of 0 all
+/// pairs, also if no body has moved. Thread safety: one call at a time for each scratch.
 ///
 /// # Safety
 /// `ids` are `id_count` numbers, `out` are `capacity` places; other pointers are null or valid.
@@ -201,9 +260,12 @@ pub unsafe extern "C" fn nearmiss_world_near_pairs(
 
 /// Decides whether two bodies touch: two scans as `nearmiss_collide` does, a scan and a shape as
 /// `nearmiss_touch` does, a scan and a mesh as two scans, and other pairs exactly. A mesh is its triangles
-/// without an inside. `hint` counts for two scans only, and `limits` for pairs without a shape. Answers
-/// about shapes and meshes have no normals. Thread safety: one call at a time for each scratch and each
-/// hint.
+/// without an inside. `hint` counts for two scans only, and `limits` for pairs without a shape.
+///
+/// Answers about two scans, or a scan and a mesh, have all fields; the source of a mesh is its triangle.
+/// Other answers have verdict, evidence, reason, witness, band and likelihood, and those about a scan and a
+/// shape the source of the scan. Their remaining numbers are missing, and their work is 0. Thread safety: one
+/// call at a time for each scratch and each hint.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_collide(
     world: Option<&World>,
@@ -226,6 +288,12 @@ pub extern "C" fn nearmiss_world_collide(
                 let hint = get_mut(hint, "hint")?;
                 Answer::new(&pair.hinted(hint).collide(&plan.collide, &mut memory.scratch))
             }
+            (nearmiss::BodyPair::MeshAndScan { pair, mesh_is_first }, _) => {
+                let options = plan.collide.options();
+                let plan = MeshScanPlan::new(options, pair.scan().scan()).map_err(Failure::argument)?;
+                let answer = Answer::new(&pair.collide(&plan, &mut memory.scratch));
+                if *mesh_is_first { answer.swapped() } else { answer }
+            }
             (nearmiss::BodyPair::ShapeAndScan { pair, shape_is_first }, _) => {
                 Answer::of_shape(&pair.touch(&plan.shape, &mut memory.scratch), *shape_is_first)
             }
@@ -235,8 +303,9 @@ pub extern "C" fn nearmiss_world_collide(
     })
 }
 
-/// Bounds the distance of two bodies: of two scans as `nearmiss_distance` does. Infinite for invalid poses.
-/// `limits` may be null. Thread safety: one call at a time for each scratch.
+/// Bounds the distance of two bodies: of two scans as `nearmiss_distance` does. It is unknown if a pose or a
+/// shape is out of range. `limits` may be null, and count for pairs without a shape. Thread safety: one call
+/// at a time for each scratch.
 #[unsafe(no_mangle)]
 pub extern "C" fn nearmiss_world_distance(
     world: Option<&World>,
@@ -249,10 +318,8 @@ pub extern "C" fn nearmiss_world_distance(
     guard(|| {
         let (world, plan) = (get(world, "world")?, get(plan, "plan")?);
         let bodies = pair_of(world, pair)?.within(&budget(limits)?);
-        let found = bodies.distance(&plan.distance, &mut get_mut(scratch, "scratch")?.scratch);
-        let told =
-            |found: nearmiss::BodyDistance| BodyDistance::new(pair, found.lower, found.upper, found.points);
-        write(out, found.map_or(BodyDistance::unknown(pair), told))
+        let memory = &mut get_mut(scratch, "scratch")?.scratch;
+        write(out, BodyDistance::between(pair, &bodies, &plan.distance, memory))
     })
 }
 
@@ -287,9 +354,12 @@ pub extern "C" fn nearmiss_world_penetration(
 }
 
 /// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within `reach`,
-/// which may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot.
-/// `lower` is at most `reach`, and a bound for all pairs that count. If none does, both ids are `UINT64_MAX`.
-/// Thread safety: one call at a time for each scratch.
+/// which may be infinite. `ignored` are pairs that do not count, such as neighbouring links of a robot. Pairs
+/// with a pose or a shape out of range are left out, as their distance is unknown.
+///
+/// `lower` is at most `reach`, and a bound for all pairs that count. If nothing is found, both ids are
+/// `UINT64_MAX`, `upper` is infinite, and `lower` is `reach`, or 0 if a pair was left out. Thread safety: one
+/// call at a time for each scratch.
 ///
 /// # Safety
 /// `ignored` are `ignored_count` pairs; other pointers are null or valid.
@@ -310,16 +380,23 @@ pub unsafe extern "C" fn nearmiss_world_nearest_pair(
         }
         // SAFETY: the caller promises the pairs.
         let ignored = unsafe { slice(ignored, ignored_count, "ignored") }?;
+        let mut any_counts = false;
         let counts = |a: BodyId, b: BodyId| {
-            !ignored.iter().any(|pair| [(pair.a, pair.b), (pair.b, pair.a)].contains(&(a.0, b.0)))
+            let counts =
+                !ignored.iter().any(|pair| [(pair.a, pair.b), (pair.b, pair.a)].contains(&(a.0, b.0)));
+            any_counts |= counts;
+            counts
         };
         let memory = &mut get_mut(scratch, "scratch")?.scratch;
         let found = world.nearest_pair(Bodies::All, reach, counts, &plan.distance, memory);
-        let told = |found: nearmiss::NearestPair| {
-            let [a, b] = found.ids.map(|id| id.0);
-            BodyDistance::new(BodyPair { a, b }, found.lower, found.upper, found.points)
+        let Some(nearmiss::NearestPair { ids, points, lower, upper }) = found else {
+            // If pairs were near but none was found, their distances are unknown.
+            let lower = if any_counts { 0.0 } else { reach };
+            let nobody = BodyPair { a: u64::MAX, b: u64::MAX };
+            return write(out, BodyDistance::beyond(nobody, lower, !any_counts));
         };
-        let none = BodyPair { a: u64::MAX, b: u64::MAX };
-        write(out, found.map_or(BodyDistance::unknown(none), told))
+        let has_scan = ids.iter().any(|&id| matches!(world.get(id), Some(Body::Scan(_))));
+        let pair = BodyPair { a: ids[0].0, b: ids[1].0 };
+        write(out, BodyDistance::found(pair, [lower, upper], points).estimated(has_scan))
     })
 }

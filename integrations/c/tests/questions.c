@@ -58,6 +58,11 @@ static void pairs(void) {
     NearmissDistance distance;
     OK(nearmiss_distance(plan, &low, &high, NULL, scratch, &distance));
     CHECK(distance.lower <= 0.3 && fabs(distance.upper - 0.3) < 1e-6 && distance.complete);
+    NearmissPlaced beyond = low;
+    beyond.pose.scale = 1e-40;
+    OK(nearmiss_distance(plan, &low, &beyond, NULL, scratch, &distance));
+    CHECK(distance.lower == 0.0 && isinf(distance.upper) && isnan(distance.point_a[0]));
+    CHECK(distance.source_b == UINT32_MAX && distance.evidence == NEARMISS_EVIDENCE_NONE && !distance.complete);
 
     NearmissPenetration out;
     OK(nearmiss_penetration(plan, &low, &high, NEARMISS_SOLIDS_NONE, NULL, scratch, &out));
@@ -106,7 +111,26 @@ static void shapes(void) {
         CHECK(distances[i].lower <= 0.1 && fabs(distances[i].upper - 0.1) < 1e-6);
     }
     OK(nearmiss_shape_distance(plan, &floor, all, 1, 0.01, scratch, distances));
-    CHECK(isinf(distances[0].upper) && distances[0].source == UINT32_MAX);
+    CHECK(isinf(distances[0].upper) && distances[0].source == UINT32_MAX && distances[0].lower == 0.01);
+    /* Lower bounds hold where no disc is near enough, too. Discs may be nearer than they prove. */
+    OK(nearmiss_shape_distance(plan, &floor, all, 7, 0.0999, scratch, distances));
+    for (int i = 0; i < 7; i++) {
+        CHECK(isinf(distances[i].upper) && distances[i].lower > 0.05 && distances[i].lower <= 0.0999);
+        CHECK(distances[i].evidence == NEARMISS_EVIDENCE_NONE && isnan(distances[i].point[0]));
+    }
+    NearmissPenetration pressed;
+    NearmissPose magnified = above;
+    magnified.scale = 1e20;
+    NearmissShape beyond = nearmiss_box(magnified, 1e300, 1e300, 1e300);
+    const double limits[2] = {0.5, INFINITY};
+    for (int i = 0; i < 2; i++) {
+        OK(nearmiss_shape_distance(plan, &floor, &beyond, 1, limits[i], scratch, distances));
+        CHECK(distances[0].lower == 0.0 && isinf(distances[0].upper));
+    }
+    OK(nearmiss_touch(plan, &floor, &beyond, 1, scratch, answers));
+    CHECK(answers[0].verdict == NEARMISS_VERDICT_UNDECIDED && answers[0].reason == NEARMISS_REASON_SHAPE);
+    OK(nearmiss_shape_penetration(plan, &floor, &beyond, NEARMISS_SOLIDS_NONE, NULL, scratch, &pressed));
+    CHECK(pressed.lower == 0.0 && isinf(pressed.upper) && pressed.evidence == NEARMISS_EVIDENCE_NONE);
 
     const double sunk[3] = {0.5, 0.5, 0.05};
     NearmissShape ball = nearmiss_sphere(&sunk, 0.1);
@@ -183,6 +207,11 @@ static void motions(void) {
     CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && answer.t_free <= answer.t_hit);
     CHECK(fabs(answer.t_hit - 0.45) < 0.01 && answer.t_hit - answer.t_free < 0.02);
     CHECK(fabs(answer.witness[2]) < 1e-3 && answer.evidence == NEARMISS_EVIDENCE_NONE);
+    NearmissPose magnified = origin;
+    magnified.scale = 1e20;
+    NearmissShape beyond = nearmiss_box(magnified, 1e300, 1e300, 1e300);
+    OK(nearmiss_shape_sweep(plan, &floor, &beyond, moving, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_UNDECIDED && answer.reason == NEARMISS_REASON_SHAPE);
     ball.rounding = -1;
     CHECK(nearmiss_shape_sweep(plan, &floor, &ball, moving, scratch, &answer) == NEARMISS_STATUS_ARGUMENT);
     CHECK(nearmiss_shape_sweep(plan, &floor, NULL, moving, scratch, &answer) == NEARMISS_STATUS_NULL);
@@ -243,9 +272,26 @@ static void worlds_of_shapes(void) {
     OK(nearmiss_world_nearest_pair(world, plan, INFINITY, NULL, 0, scratch, &found));
     CHECK(found.upper == 0.0);
     OK(nearmiss_world_nearest_pair(world, plan, 0.01, &joint, 1, scratch, &found));
-    CHECK(found.pair.a == UINT64_MAX && isinf(found.upper));
+    CHECK(found.pair.a == UINT64_MAX && isinf(found.upper) && found.lower == 0.01 && found.complete);
     OK(nearmiss_world_distance(world, plan, (NearmissBodyPair){floor, wedge}, NULL, scratch, &found));
-    CHECK(found.lower > 2.95 && fabs(found.upper - 3.0) < 1e-6);
+    CHECK(found.lower > 2.95 && fabs(found.upper - 3.0) < 1e-6 && found.complete);
+    /* Nothing is known about a body whose scale is out of range. */
+    NearmissWorld *odd;
+    uint64_t tiny, thing;
+    NearmissPlaced shrunk = low;
+    shrunk.pose.scale = 1e-40;
+    OK(nearmiss_world_new(&odd));
+    OK(nearmiss_world_insert(odd, &low, &thing));
+    OK(nearmiss_world_insert(odd, &shrunk, &tiny));
+    OK(nearmiss_world_distance(odd, plan, (NearmissBodyPair){thing, tiny}, NULL, scratch, &found));
+    CHECK(found.lower == 0.0 && isinf(found.upper) && isnan(found.point_b[0]) && !found.complete);
+    CHECK(found.pair.a == thing && found.evidence == NEARMISS_EVIDENCE_NONE);
+    OK(nearmiss_world_nearest_pair(odd, plan, 0.5, NULL, 0, scratch, &found));
+    CHECK(found.pair.a == UINT64_MAX && found.lower == 0.0 && isinf(found.upper) && !found.complete);
+    NearmissBodyPair both = {thing, tiny};
+    OK(nearmiss_world_nearest_pair(odd, plan, 0.5, &both, 1, scratch, &found));
+    CHECK(found.pair.a == UINT64_MAX && found.lower == 0.5);
+    OK(nearmiss_world_free(odd));
 
     NearmissAnswer answer;
     OK(nearmiss_world_collide(world, plan, joint, NULL, NULL, scratch, &answer));
@@ -329,13 +375,23 @@ static void worlds_of_meshes(void) {
     OK(nearmiss_world_insert(world, &low, &floor));
     OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){floor, first}, NULL, NULL, scratch, &answer));
     CHECK(answer.verdict == NEARMISS_VERDICT_SEPARATED && answer.evidence == NEARMISS_EVIDENCE_CERTIFIED);
+    CHECK(answer.gap > 0.0 && answer.gap <= 0.2 && isnan(answer.likelihood));
     OK(nearmiss_world_distance(world, plan, (NearmissBodyPair){floor, first}, NULL, scratch, &found));
-    CHECK(found.lower <= 0.2 && found.lower > 0.17 && fabs(found.upper - 0.2) < 1e-6);
+    CHECK(found.lower <= 0.2 && found.lower > 0.17 && fabs(found.upper - 0.2) < 1e-6 && found.complete);
     CHECK(fabs(found.point_a[2]) < 1e-6 && fabs(found.point_b[2] - 0.2) < 1e-6);
     pose = at(0.3, 0.3, -0.05).pose;
     OK(nearmiss_world_move(world, first, &pose));
     OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){first, floor}, NULL, NULL, scratch, &answer));
     CHECK(answer.verdict == NEARMISS_VERDICT_TOUCHING && fabs(answer.witness[2]) < 0.02);
+    CHECK(answer.source_a < 12 && answer.source_b < PLATE && answer.node_pairs + answer.leaf_pairs > 0);
+    CHECK(fabs(answer.normal_a[2]) < 1e-6 && fabs(answer.normal_b[2]) > 0.99);
+    NearmissBudget budget = nearmiss_unlimited();
+    budget.work = 1;
+    OK(nearmiss_world_collide(world, plan, (NearmissBodyPair){floor, first}, &budget, NULL, scratch, &answer));
+    CHECK(answer.verdict == NEARMISS_VERDICT_UNDECIDED && answer.reason == NEARMISS_REASON_BUDGET);
+    CHECK(answer.likelihood >= 0.0 && answer.likelihood <= 1.0 && answer.source_a == UINT32_MAX);
+    OK(nearmiss_world_distance(world, plan, (NearmissBodyPair){floor, first}, &budget, scratch, &found));
+    CHECK(!found.complete && found.lower >= 0.0 && found.lower <= found.upper);
 
     NearmissPenetration out;
     NearmissBodyPair pressed = {floor, first};
