@@ -10,13 +10,16 @@ use pyo3::sync::MutexExt;
 
 use crate::failure::refused;
 use crate::pool::in_pool;
-use crate::prepare::watched;
+use crate::prepare::in_thread;
 
 /// A moving scan that threads share.
 ///
 /// A question takes a reference of the current frame and works without the lock, so it sees one whole
 /// frame, and questions about several moving scans cannot wait for each other. A change holds the
 /// lock until it is complete. It copies the frame first if a question still uses it.
+///
+/// No thread of the pool takes the lock: while it waits for a part of one change, it may take up another
+/// one, which would wait for the lock that this thread holds.
 #[derive(Debug)]
 pub(crate) struct Moving(Mutex<Latest>);
 
@@ -45,7 +48,7 @@ impl Moving {
         py: Python<'_>,
         work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError> + Send,
     ) -> PyResult<&'static str> {
-        py.detach(|| in_pool(|| self.change_here(work)))?.map_err(refused)
+        py.detach(|| self.change_here(work))?.map_err(refused)
     }
 
     /// Does the same in a thread of its own. Ctrl-C ends the wait; the change is then completed in the
@@ -56,16 +59,20 @@ impl Moving {
         work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError> + Send + 'static,
     ) -> PyResult<&'static str> {
         let moving = Arc::clone(self);
-        watched(py, None, &Progress::default(), move || moving.change_here(work))?.map_err(refused)
+        in_thread(py, None, &Progress::default(), move || moving.change_here(work))?.map_err(refused)
     }
 
+    /// Takes the lock in this thread, which is none of the pool, and then works in the pool.
     fn change_here(
         &self,
-        work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError>,
-    ) -> Result<&'static str, DeformError> {
+        work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError> + Send,
+    ) -> PyResult<Result<&'static str, DeformError>> {
         let mut latest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let renewal = work(Arc::make_mut(&mut latest.scan))?;
-        latest.renewal = Some(renewal);
+        let scan = &mut latest.scan;
+        let renewal = in_pool(|| work(Arc::make_mut(scan)))?;
+        if let Ok(how) = renewal {
+            latest.renewal = Some(how);
+        }
         Ok(renewal)
     }
 }

@@ -21,10 +21,20 @@ pub(crate) fn watched<T: Send + 'static>(
     progress: &Progress,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
+    in_thread(py, told, progress, move || in_pool(work))
+}
+
+/// Does the same, but runs `work` in the new thread alone, which is none of the pool and may wait for locks.
+pub(crate) fn in_thread<T: Send + 'static>(
+    py: Python<'_>,
+    told: Option<&Bound<'_, PyAny>>,
+    progress: &Progress,
+    work: impl FnOnce() -> PyResult<T> + Send + 'static,
+) -> PyResult<T> {
     let (sender, mut receiver) = channel();
     let run = move || {
         // Nobody listens after an exception.
-        let _ignored = sender.send(in_pool(work));
+        let _ignored = sender.send(work());
     };
     std::thread::Builder::new().name("nearmiss".into()).spawn(run).map_err(refused)?;
     loop {

@@ -1,8 +1,12 @@
 """Moving scans: their frames, the questions about them, threads that move and ask."""
 
+import os
 import pickle
+import subprocess
+import sys
 import threading
 import unittest
+from pathlib import Path
 
 import numpy as np
 
@@ -303,6 +307,50 @@ class Threads(unittest.TestCase):
             thread.join(60)
         self.assertFalse([thread for thread in movers + askers if thread.is_alive()], "threads that wait forever")
         self.assertEqual(wrong, [])
+
+    def test_threads_that_change_one_scan_wait_for_each_other_only(self):
+        """Threads of the pool that steal another change must not wait for the lock of the first one."""
+        code = """
+import threading
+import numpy as np
+import nearmiss
+from scenes import plate
+
+points = plate(count=100)
+moving, failed = nearmiss.MovingScan(points), []
+
+def change(seed):
+    try:
+        for step in range(24):
+            frame = points + [0.0, 0.0, 0.5 + 0.01 * ((seed + step) % 7)]
+            if (seed + step) % 3 == 0:
+                moving.replace(frame)
+            elif (seed + step) % 3 == 1:
+                moving.replace_organised(frame.reshape(100, 100, 3))
+            else:
+                moving.move_to(points * (1.0 + 0.5 * (step % 2)))
+    except BaseException as cause:
+        failed.append(cause)
+
+threads = [threading.Thread(target=change, args=(seed,)) for seed in range(4)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+assert not failed, failed
+print(len(moving))
+"""
+        # The time limit ends the test if threads wait for ever.
+        told = subprocess.run(
+            [sys.executable, "-B", "-c", code],
+            cwd=Path(__file__).parent,
+            env={**os.environ, "RAYON_NUM_THREADS": "4"},
+            capture_output=True,
+            text=True,
+            timeout=180,
+            check=False,
+        )
+        self.assertEqual((told.returncode, told.stdout.strip()), (0, "10000"), told.stderr)
 
     def test_the_world_takes_still_frames(self):
         world, moving = nearmiss.World(), MovingScan(plate())
