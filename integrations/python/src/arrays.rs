@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::failure::refused;
 
-/// Rows of three coordinates: the array itself where it is contiguous, else a copy.
+/// Rows of three coordinates: the array itself where it is contiguous and aligned, else a copy.
 pub(crate) enum Points<'py> {
     Single(PyReadonlyArray2<'py, f32>),
     Double(PyReadonlyArray2<'py, f64>),
@@ -19,14 +19,20 @@ fn numpy<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyModule>> {
     py.import("numpy")
 }
 
-/// Returns an array of double precision with the numbers of `given`, contiguous. `expected` is what
-/// an error says was expected.
+/// Returns `true` if an array can be read as a slice. A view of packed data may be contiguous, but not
+/// aligned.
+pub(crate) fn is_slice<'py>(array: &impl PyUntypedArrayMethods<'py>) -> bool {
+    array.is_c_contiguous() && array.is_aligned()
+}
+
+/// Returns an array of double precision with the numbers of `given`, contiguous and aligned. `expected` is
+/// what an error says was expected.
 pub(crate) fn doubles<'py>(
     given: &Bound<'py, PyAny>,
     expected: &str,
 ) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     if let Ok(array) = given.extract::<PyReadonlyArrayDyn<'py, f64>>()
-        && array.is_c_contiguous()
+        && is_slice(&*array)
     {
         return Ok(array);
     }
@@ -40,16 +46,18 @@ pub(crate) fn doubles<'py>(
             "expected {expected}, got {class} without numbers; give an array of floats"
         )));
     };
+    // Makes a copy, which is aligned.
     let array = array.call_method1("astype", ("float64",))?;
     numpy(given.py())?.call_method1("ascontiguousarray", (array,))?.extract()
 }
 
 impl<'py> Points<'py> {
-    /// Reads an array of shape (N, 3). Arrays of float32 and float64 that are contiguous are not copied.
+    /// Reads an array of shape (N, 3). Arrays of float32 and float64 that are contiguous and aligned are not
+    /// copied.
     pub(crate) fn new(given: &Bound<'py, PyAny>) -> PyResult<Self> {
         const EXPECTED: &str = "an array of points of shape (N, 3)";
         let points = match given.extract::<PyReadonlyArray2<'py, f32>>() {
-            Ok(array) if array.is_c_contiguous() => Self::Single(array),
+            Ok(array) if is_slice(&*array) => Self::Single(array),
             _ => {
                 let array = doubles(given, EXPECTED)?;
                 let array = array.extract::<PyReadonlyArray2<'py, f64>>();

@@ -4,7 +4,7 @@ use nearmiss::{Aabb, Mesh, MeshHierarchy, PointHierarchy, Pose};
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::arrays::{doubles, wrong_shape};
+use crate::arrays::{doubles, is_slice, wrong_shape};
 use crate::failure::refused;
 
 /// A row-major 4×4 matrix.
@@ -71,7 +71,7 @@ impl<'py> Poses<'py> {
     pub(crate) fn new(given: Option<&Bound<'py, PyAny>>) -> PyResult<Self> {
         let Some(given) = given else { return Ok(Self::One(IDENTITY)) };
         if let Ok(array) = given.extract::<PyReadonlyArrayDyn<'py, f64>>()
-            && array.is_c_contiguous()
+            && is_slice(&*array)
             && array.shape().ends_with(&[4, 4])
         {
             return Self::of(array, given);

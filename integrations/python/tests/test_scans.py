@@ -261,6 +261,32 @@ class Questions(unittest.TestCase):
         self.assertTrue(((contacts["point"] > low - 0.01) & (contacts["point"] < high + 0.01)).all())
         self.assertEqual(scan.contacts(scan, nearmiss.pose(translation=[9, 0, 0])).shape, (0,))
 
+    def test_misaligned_arrays_are_copied(self):
+        points = plate(count=20)
+        packed = np.zeros(len(points), dtype=[("flag", "u1"), ("place", "<f8", (3,)), ("at", "<f4", (3,))])
+        packed["place"], packed["at"] = points, points
+        data = bytes(1) + points.tobytes()
+        shifted = np.frombuffer(data, dtype="<f8", offset=1).reshape(-1, 3)
+        single = np.frombuffer(bytes(1) + points.astype("<f4").tobytes(), dtype="<f4", offset=1).reshape(-1, 3)
+        self.assertTrue(shifted.flags.c_contiguous and not shifted.flags.aligned)
+        expected = nearmiss.Scan(points)
+        for given in (packed["place"], packed["at"], shifted, single):
+            scan = nearmiss.Scan(given)
+            self.assertEqual(len(scan), len(points))
+            np.testing.assert_allclose(scan.bounds, expected.bounds, atol=1e-6)
+        moving = nearmiss.MovingScan(points)
+        moving.move_to(shifted)
+        moving.move_to(single)
+        pose = nearmiss.pose(translation=[0, 0, 0.3])
+        poses = np.frombuffer(bytes(1) + np.stack([pose] * 2).tobytes(), dtype="<f8", offset=1).reshape(-1, 4, 4)
+        self.assertFalse(poses.flags.aligned)
+        self.assertEqual(expected.collide(expected, poses[0]).touches, False)
+        self.assertEqual(expected.collide_each(expected, poses)["verdict"].tolist(), [0, 0])
+        # One row of a packed structure is contiguous, but not aligned.
+        self.assertIsInstance(nearmiss.Shape.hull(packed["place"][:1]), nearmiss.Shape)
+        above = np.frombuffer(bytes(1) + (points + [0, 0, 1]).tobytes(), dtype="<f8", offset=1).reshape(-1, 3)
+        self.assertTrue(expected.target().cast_each(above, [0, 0, -1])["hit"].any())
+
 
 if __name__ == "__main__":
     unittest.main()
