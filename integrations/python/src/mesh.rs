@@ -115,8 +115,9 @@ impl Mesh {
 
     /// True if a part of the mesh is closed, and counts as solid in `penetration`.
     #[getter]
-    fn is_closed(&self) -> bool {
-        self.mesh.solid().is_closed()
+    fn is_closed(&self, py: Python<'_>) -> bool {
+        // The closed parts are found when first asked for.
+        py.detach(|| self.mesh.solid().is_closed())
     }
 
     /// Decide whether this mesh, at `own_pose`, touches `other`, at `pose`: a Mesh or any scan.
