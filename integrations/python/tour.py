@@ -32,7 +32,8 @@ print(f"{(answers['verdict'] == 1).sum()} of {len(answers)} poses touch, {1e6 * 
 print(f"the least certified gap is {np.nanmin(answers['gap']):.4g}")
 
 # Contact points for a solver, and all contacts.
-print(len(scan.manifold(scan, near)), "manifold points,", len(scan.contacts(scan, near)), "contacts")
+(answer, manifold), (_, contacts) = scan.manifold(scan, near), scan.contacts(scan, near)
+print(answer, "with", len(manifold), "manifold points and", len(contacts), "contacts")
 
 # Shapes and rays against the surface.
 target = scan.target()

@@ -4,8 +4,8 @@ use nearmiss::{BodyVerdict, Evidence, MeshVerdict, Reason, ShapeVerdict, Verdict
 use pyo3::prelude::*;
 
 use crate::codes::{
-    NONE, NOWHERE, answer, bounds_in_words, contact_in_words, evidence_code, evidence_name, index, is_one,
-    is_touching, number, plain, reason_code, reason_name, vector, verdict_name,
+    BUDGET, NONE, NOWHERE, answer, bounds_in_words, contact_in_words, evidence_code, evidence_name, index,
+    is_one, is_touching, number, plain, reason_code, reason_name, vector, verdict_name,
 };
 use crate::record::{Record, record};
 
@@ -33,7 +33,8 @@ record! {
         verdict: i8 = "i1",
         evidence: i8 = "i1",
         reason: i8 = "i1",
-        _padding: [u8; 5] = "5u1",
+        complete: u8 = "?",
+        _padding: [u8; 4] = "4u1",
     }
 }
 
@@ -56,7 +57,8 @@ impl AnswerRecord {
             verdict: -1,
             evidence: -1,
             reason: 0,
-            _padding: [0; 5],
+            complete: 1,
+            _padding: [0; 4],
         };
         match answer.verdict {
             Verdict::Intersecting { contact, evidence } => {
@@ -82,7 +84,7 @@ impl AnswerRecord {
             }
             Verdict::Undecided(reason) => {
                 let likelihood = if let Reason::Budget { likelihood } = reason { likelihood } else { NONE };
-                Self { reason: reason_code(reason), likelihood, ..none }
+                Self { likelihood, ..none.undecided(reason_code(reason)) }
             }
         }
     }
@@ -98,7 +100,17 @@ impl PairRecord for AnswerRecord {
 impl AnswerRecord {
     /// An answer of which nothing is known but the band.
     fn unasked(band: f64) -> Self {
-        Self { likelihood: NONE, band, reason: 0, ..Self::new(&nearmiss::Answer::UNASKED) }
+        Self { likelihood: NONE, band, reason: 0, complete: 1, ..Self::new(&nearmiss::Answer::UNASKED) }
+    }
+
+    /// An undecided answer, incomplete if the reason is a limit.
+    fn undecided(self, reason: i8) -> Self {
+        Self { reason, complete: (reason != BUDGET).into(), ..self }
+    }
+
+    /// The same answer, with a list that is complete or not.
+    pub(crate) fn with_list(self, is_complete: bool) -> Self {
+        Self { complete: is_complete.into(), ..self }
     }
 
     /// An answer about a scan and a shape.
@@ -112,7 +124,7 @@ impl AnswerRecord {
             ShapeVerdict::Separated { evidence } => {
                 Self { verdict: 0, evidence: evidence_code(evidence), ..none }
             }
-            ShapeVerdict::Undecided(reason) => Self { reason: reason_code(reason), ..none },
+            ShapeVerdict::Undecided(reason) => none.undecided(reason_code(reason)),
         }
     }
 
@@ -126,14 +138,13 @@ impl AnswerRecord {
             BodyVerdict::Separated { evidence } => {
                 Self { verdict: 0, evidence: evidence_code(evidence), ..none }
             }
-            BodyVerdict::Undecided(reason) => Self { reason: reason_code(reason), ..none },
+            BodyVerdict::Undecided(reason) => none.undecided(reason_code(reason)),
         }
     }
 
     /// An answer about two meshes, which is exact unless it is undecided. Sources are triangles.
     pub(crate) fn of_meshes(answer: &nearmiss::MeshAnswer) -> Self {
-        let mut record = Self { likelihood: answer.likelihood, ..Self::new(&nearmiss::Answer::UNASKED) };
-        (record.band, record.reason) = (0.0, 0);
+        let mut record = Self { likelihood: answer.likelihood, ..Self::unasked(0.0) };
         let statistics = answer.statistics;
         (record.node_pairs, record.leaf_pairs) = (statistics.node_pairs, statistics.leaf_pairs);
         match answer.verdict {
@@ -145,8 +156,8 @@ impl AnswerRecord {
                 (record.source_a, record.source_b) = (best.triangle_a, best.triangle_b);
             }
             MeshVerdict::Separated => (record.verdict, record.evidence, record.gap) = (0, 1, 0.0),
-            MeshVerdict::Pose => record.reason = reason_code(Reason::Pose),
-            _ => record.reason = reason_code(Reason::Budget { likelihood: answer.likelihood }),
+            MeshVerdict::Pose => record = record.undecided(reason_code(Reason::Pose)),
+            _ => record = record.undecided(BUDGET),
         }
         record
     }
@@ -156,10 +167,13 @@ answer! {
     /// The answer of `collide`.
     Answer of AnswerRecord by answer_in_words {
         @verdict touches: ["separated", "intersecting"],
-        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided.
+        /// The evidence of the verdict: "certified" or "estimated"; None if it is undecided.
         evidence: Option<&'static str> = evidence_name,
         /// The reason why the verdict is undecided, in a word, such as "budget"; else None.
         reason: Option<&'static str> = reason_name,
+        /// False if a limit ended the search, so that the verdict is undecided, or the list that belongs to
+        /// it may lack contacts.
+        complete: bool = is_one,
         /// A place where the two touch, in the world; None if they are apart or undecided.
         witness: Option<[f64; 3]> = vector,
         /// The unit normal of the first thing at the witness, in the world; None if it has none.
@@ -219,7 +233,7 @@ impl DistanceRecord {
     pub(crate) const UNKNOWN: Self = Self {
         point_a: NOWHERE,
         point_b: NOWHERE,
-        lower: f64::INFINITY,
+        lower: 0.0,
         upper: f64::INFINITY,
         band: NONE,
         source_a: -1,
@@ -232,10 +246,23 @@ impl DistanceRecord {
         _padding: [0; 6],
     };
 
-    /// The record of the distance of two bodies, of which the lower bound is proven.
-    pub(crate) fn of_bodies((lower, upper): (f64, f64), [point_a, point_b]: [[f64; 3]; 2]) -> Self {
-        let evidence = evidence_code(Evidence::Certified);
-        Self { point_a, point_b, lower, upper, evidence, complete: 1, ..Self::UNKNOWN }
+    /// The record of the distance of two bodies. The evidence and the band are not known, unless neither body
+    /// is a scan: bounds about meshes and shapes are exact.
+    pub(crate) fn of_bodies(
+        (lower, upper): (f64, f64),
+        [point_a, point_b]: [[f64; 3]; 2],
+        has_scan: bool,
+    ) -> Self {
+        let (evidence, band) = if has_scan { (-1, NONE) } else { (evidence_code(Evidence::Certified), 0.0) };
+        Self { point_a, point_b, lower, upper, evidence, band, complete: 1, ..Self::UNKNOWN }
+    }
+
+    /// The record of the distance of a scan and a shape.
+    pub(crate) fn of_shape(distance: &nearmiss::ShapeDistance) -> Self {
+        let (band, source_a) = (distance.band, distance.source.0.into());
+        let evidence = evidence_code(distance.evidence);
+        let bounds = (distance.lower, distance.upper);
+        Self { band, source_a, evidence, ..Self::of_bodies(bounds, distance.points, true) }
     }
 
     pub(crate) fn new(distance: &nearmiss::Distance) -> Self {
@@ -263,21 +290,24 @@ impl DistanceRecord {
 answer! {
     /// The answer of `distance`.
     Distance of DistanceRecord by distance_in_words {
-        /// A lower bound of the distance, a length; 0 if the two may touch.
+        /// A lower bound of the distance, a length; 0 if the two may touch, or if nothing is known.
         lower: f64 = plain,
-        /// An upper bound of the distance: that of the two points.
+        /// An upper bound of the distance: that of the two points; infinite if nothing is known.
         upper: f64 = plain,
-        /// A point of the first thing, in the world.
-        point_a: [f64; 3] = plain,
-        /// A point of the second thing near it, in the world.
-        point_b: [f64; 3] = plain,
-        /// The local spacing, below which the two do not determine the truth, a length.
-        band: f64 = plain,
-        /// The index of the point (of the triangle, for a mesh) of the first thing, in its input.
-        source_a: i64 = plain,
+        /// A point of the first thing, in the world; None if nothing is known.
+        point_a: Option<[f64; 3]> = vector,
+        /// A point of the second thing near it, in the world; None if nothing is known.
+        point_b: Option<[f64; 3]> = vector,
+        /// The local spacing, below which the two do not determine the truth, a length; 0 for meshes and
+        /// shapes. None if it is not known, as for a scan in `World.nearest`.
+        band: Option<f64> = number,
+        /// The index of the point (of the triangle, for a mesh) of the first thing, in its input. None for a
+        /// shape, for a mesh with a shape, and in `World.nearest`.
+        source_a: Option<i64> = index,
         /// The same for the second thing.
-        source_b: i64 = plain,
-        /// How well the lower bound is supported: "certified" or "estimated".
+        source_b: Option<i64> = index,
+        /// The evidence of the upper bound: "certified" if the two points were verified to be on the
+        /// surfaces, else "estimated". None if it is not known, as for a scan in `World.nearest`.
         evidence: Option<&'static str> = evidence_name,
         /// False if a limit ended the search before the bounds were as near as requested.
         complete: bool = is_one,

@@ -8,13 +8,14 @@ use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::answers::{Answer, ClashRecord, ContactRecord, Distance, ManifoldRecord};
+use crate::answers::{Answer, AnswerRecord, ClashRecord, ContactRecord, Distance, ManifoldRecord};
 use crate::cloud::rows;
 use crate::failure::refused;
 use crate::frame::Frame;
 use crate::hint::Hint;
-use crate::options::{OF_MEANING, OF_SCANS, OF_SHAPES, Options};
+use crate::options::{OF_MEANING, OF_SCANS, OF_SHAPES, Options, may_have_ended};
 use crate::pair::{Apart, Contact, Overlap, Question, interiors, pair_of};
+use crate::penetration::Penetration;
 use crate::pool::ask;
 use crate::poses::{Poses, both};
 use crate::record::array;
@@ -189,10 +190,12 @@ impl AnyScan {
         self.ask::<Apart<'_>>(py, &other, options)?.each(py, [own_poses, Some(poses)])
     }
 
-    /// Return a contact of each pair of leaves that touch, as a structured array of shape (N,).
+    /// Find a contact of each pair of leaves that touch. Returns the Answer and the contacts, as a structured
+    /// array of shape (N,). Contacts may be missing if `Answer.complete` is False.
     ///
-    /// Its fields are `point`, `normal_a`, `normal_b`, `residual`, `source_a` and `source_b`; sources
-    /// are indices of the input points, or of the triangles of a Mesh. Options are those of `collide`.
+    /// The fields of the array are `point`, `normal_a`, `normal_b`, `residual`, `source_a` and `source_b`;
+    /// sources are indices of the input points, or of the triangles of a Mesh. Options are those of
+    /// `collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, **options))]
     fn contacts<'py>(
         &self,
@@ -201,11 +204,11 @@ impl AnyScan {
         pose: Option<&Bound<'py, PyAny>>,
         own_pose: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<(Answer, Bound<'py, PyAny>)> {
         let scan = self.0.frame(py);
         let options = Options::new(options, OF_SCANS, scan.metric())?;
         let mut found = Contacts::default();
-        match other.side() {
+        let answer = match other.side() {
             Side::Scan(other) => {
                 let scans = [scan, other];
                 let plan = CollidePlan::new(&options.collide, &scans[0], &scans[1]).map_err(refused)?;
@@ -213,7 +216,7 @@ impl AnyScan {
                 ask(py, |scratch| {
                     let pair = pair_of(&scans, &poses).within(&options.budget());
                     pair.contacts(&mut found).collide(&plan, scratch)
-                });
+                })
             }
             Side::Mesh(Mesh { mesh, .. }) => {
                 let plan = MeshScanPlan::new(&options.collide, &scan).map_err(refused)?;
@@ -221,17 +224,20 @@ impl AnyScan {
                 ask(py, |scratch| {
                     let pair = MeshScanPair::new(scan.at(&at), mesh.at(&of_mesh)).within(&options.budget());
                     pair.contacts(&plan, &mut found, scratch)
-                });
+                })
             }
-        }
-        array(py, found.contacts.iter().map(ContactRecord::new).collect())
+        };
+        let answer = Answer(AnswerRecord::new(&answer).with_list(found.complete));
+        Ok((answer, array(py, found.contacts.iter().map(ContactRecord::new).collect())?))
     }
 
-    /// Return up to eight contact points for a physics solver, as a structured array of shape (N,).
-    /// The first is the deepest; each of the others is the candidate furthest from all earlier ones.
+    /// Find up to eight contact points for a physics solver. Returns the Answer and the points, as a
+    /// structured array of shape (N,). The first is the deepest; each of the others is the candidate furthest
+    /// from all earlier ones. If `Answer.complete` is False, a limit may have ended the search before it knew
+    /// all candidates.
     ///
-    /// Its fields are `point`, `normal` (the direction in which this scan moves out of `other`), `gap`
-    /// (negative for penetration), `source_a` and `source_b`. Options are those of `collide`.
+    /// The fields of the array are `point`, `normal` (the direction in which this scan moves out of `other`),
+    /// `gap` (negative for penetration), `source_a` and `source_b`. Options are those of `collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, hint = None, **options))]
     fn manifold<'py>(
         &self,
@@ -240,7 +246,7 @@ impl AnyScan {
         own_pose: Option<&Bound<'py, PyAny>>,
         hint: Option<&Bound<'py, Hint>>,
         options: Option<&Bound<'py, PyDict>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> PyResult<(Answer, Bound<'py, PyAny>)> {
         let (py, scans) = (other.py(), self.scans(other));
         let options = Options::new(options, OF_SCANS, scans[0].metric())?;
         let plan = CollidePlan::new(&options.collide, &scans[0], &scans[1]).map_err(refused)?;
@@ -248,24 +254,29 @@ impl AnyScan {
         let mut hint = hint.map(|hint| hint.get().lock()).transpose()?;
         let hint = hint.as_deref_mut();
         let mut found = Vec::new();
-        ask(py, |scratch| {
-            let pair = pair_of(&scans, &poses).within(&options.budget());
+        let answer = ask(py, |scratch| {
+            let budget = options.budget();
+            let pair = pair_of(&scans, &poses).within(&budget);
             let question = pair.manifold(&mut found);
-            match hint {
+            let answer = match hint {
                 Some(hint) => question.hinted(hint).collide(&plan, scratch),
                 None => question.collide(&plan, scratch),
-            }
+            };
+            let record = AnswerRecord::new(&answer);
+            // The points are looked for after the verdict, with the rest of the budget.
+            let has_points = answer.verdict.is_intersecting();
+            if has_points { record.with_list(!may_have_ended(&budget, &answer.statistics)) } else { record }
         });
-        array(py, found.iter().map(ManifoldRecord::new).collect())
+        Ok((Answer(answer), array(py, found.iter().map(ManifoldRecord::new).collect())?))
     }
 
     /// Bound the length of the shortest move that takes `other`, at `pose`, out of this scan, at
     /// `own_pose`. `other` is any scan or a Mesh. `solid` names the scans whose surface encloses a solid:
     /// "a" for this scan, "b" for `other`, or "both". Closed parts of a mesh are solid anyway.
     ///
-    /// Returns (lower, upper, direction): `other` is free if it moves by `upper` along the direction,
-    /// and no move shorter than `lower` frees it. Both are 0 for separate things; `lower` is 0 if neither is
-    /// solid and no points are thickened. Options are those of `collide`.
+    /// Returns a Penetration: `other` is free if it moves by `upper` along `direction`, and no move shorter
+    /// than `lower` frees it. Both are 0 for separate things; `lower` is 0 if neither is solid and no points
+    /// are thickened. Options are those of `collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
     #[expect(clippy::too_many_arguments, reason = "names in Python")]
     fn penetration(
@@ -276,7 +287,7 @@ impl AnyScan {
         own_pose: Option<&Bound<'_, PyAny>>,
         solid: Option<&str>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<(f64, f64, [f64; 3])> {
+    ) -> PyResult<Penetration> {
         let sides = [Side::Scan(self.0.frame(py)), other.side()];
         Overlap::new(sides, solid, options)?.one(py, [own_pose, pose])
     }

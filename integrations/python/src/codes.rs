@@ -11,9 +11,12 @@ use pyo3::exceptions::PyTypeError;
 const REASONS: [&str; 8] =
     ["budget", "undersampled", "ambiguous", "graph", "pose", "shape", "near", "geodesic"];
 
+/// The code of the reason "budget".
+pub(crate) const BUDGET: i8 = 1;
+
 pub(crate) const fn reason_code(reason: Reason) -> i8 {
     match reason {
-        Reason::Budget { .. } => 1,
+        Reason::Budget { .. } => BUDGET,
         Reason::Undersampled => 2,
         Reason::Ambiguous => 3,
         Reason::NoGraph => 4,
@@ -26,7 +29,7 @@ pub(crate) const fn reason_code(reason: Reason) -> i8 {
 pub(crate) const fn sweep_reason_code(reason: SweepReason) -> i8 {
     match reason {
         SweepReason::Near => 7,
-        SweepReason::Budget => 1,
+        SweepReason::Budget => BUDGET,
         SweepReason::Pose => 5,
         SweepReason::Shape => 6,
         SweepReason::Geodesic => 8,

@@ -12,6 +12,7 @@ mod answers;
 mod arrays;
 mod frame;
 mod options;
+mod penetration;
 mod poses;
 mod shape_answers;
 
@@ -47,6 +48,8 @@ mod _native {
     use super::hint::{Hint, ShapeHint};
     #[pymodule_export]
     use super::moving::MovingScan;
+    #[pymodule_export]
+    use super::penetration::Penetration;
     #[pymodule_export]
     use super::scan::Scan;
     #[pymodule_export]

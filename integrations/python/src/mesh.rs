@@ -5,15 +5,17 @@ use std::path::PathBuf;
 use nearmiss::geometry::TriangleMesh;
 use nearmiss::mesh::CleanOptions;
 use nearmiss::store::Progress;
-use nearmiss::{Mesh as Prepared, MeshBuildOptions};
+use nearmiss::{Mesh as Prepared, MeshBuildOptions, Metric};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
-use crate::answers::{Answer, Distance, MeshContactRecord};
+use crate::answers::{Answer, AnswerRecord, Distance, MeshContactRecord};
 use crate::arrays::{Points, corners};
 use crate::cloud::rows;
 use crate::failure::{refused, unloadable, unreadable, unwritable};
+use crate::options::{OF_BUDGET, Options};
 use crate::pair::{Apart, Contact, Overlap, Question, mesh_pair_of};
+use crate::penetration::Penetration;
 use crate::pool::ask;
 use crate::poses::both;
 use crate::prepare::watched;
@@ -179,32 +181,37 @@ impl Mesh {
         self.ask::<Apart<'_>>(&other, options)?.each(poses.py(), [own_poses, Some(poses)])
     }
 
-    /// Return a contact of each pair of triangles of two meshes that meet, as a structured array of
-    /// shape (N,).
+    /// Find a contact of each pair of triangles of two meshes that meet. Returns the Answer and the contacts,
+    /// as a structured array of shape (N,). Contacts may be missing if `Answer.complete` is False.
     ///
-    /// Its fields are `point`, `ends` (of the segment that both have in common, of shape (2, 3)),
-    /// `normal_a`, `normal_b`, `triangle_a` and `triangle_b`.
-    #[pyo3(signature = (other, pose = None, own_pose = None))]
+    /// The fields of the array are `point`, `ends` (of the segment that both have in common, of shape (2,
+    /// 3)), `normal_a`, `normal_b`, `triangle_a` and `triangle_b`. Options are `work` and `seconds`.
+    #[pyo3(signature = (other, pose = None, own_pose = None, **options))]
     fn contacts<'py>(
         &self,
         other: &Bound<'py, Self>,
         pose: Option<&Bound<'py, PyAny>>,
         own_pose: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<(Answer, Bound<'py, PyAny>)> {
         let (py, meshes) = (other.py(), [&self.mesh, &other.get().mesh]);
+        let options = Options::new(options, OF_BUDGET, Metric::Euclidean)?;
         let poses = both(meshes.map(|mesh| mesh as _), [own_pose, pose])?;
         let mut found = Vec::new();
-        ask(py, |scratch| mesh_pair_of(&meshes, &poses).contacts(&mut found, scratch.meshes()));
-        array(py, found.iter().map(MeshContactRecord::new).collect())
+        let (answer, is_complete) = ask(py, |scratch| {
+            mesh_pair_of(&meshes, &poses).within(&options.budget()).contacts(&mut found, scratch.meshes())
+        });
+        let answer = Answer(AnswerRecord::of_meshes(&answer).with_list(is_complete));
+        Ok((answer, array(py, found.iter().map(MeshContactRecord::new).collect())?))
     }
 
     /// Bound the length of the shortest move that takes `other`, at `pose`, out of this mesh, at
     /// `own_pose`. `other` is a Mesh or any scan. Closed parts of meshes are solid; `solid="b"` tells that
     /// the surface of a scan encloses a solid.
     ///
-    /// Returns (lower, upper, direction): `other` is free if it moves by `upper` along the direction,
-    /// and no move shorter than `lower` frees it. Both are 0 for separate things. Options are `work` and
-    /// `seconds`; for a scan those of `Scan.collide`.
+    /// Returns a Penetration: `other` is free if it moves by `upper` along `direction`, and no move shorter
+    /// than `lower` frees it. Both are 0 for separate things. Options are `work` and `seconds`; for a scan
+    /// those of `Scan.collide`.
     #[pyo3(signature = (other, pose = None, own_pose = None, *, solid = None, **options))]
     #[expect(clippy::too_many_arguments, reason = "names in Python")]
     fn penetration(
@@ -215,7 +222,7 @@ impl Mesh {
         own_pose: Option<&Bound<'_, PyAny>>,
         solid: Option<&str>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<(f64, f64, [f64; 3])> {
+    ) -> PyResult<Penetration> {
         Overlap::new([Side::Mesh(self), other.side()], solid, options)?.one(py, [own_pose, pose])
     }
 }

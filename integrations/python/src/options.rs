@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use nearmiss::{Budget, CollideOptions, Deadline, Detail, Evidence, MeshQuality, Metric, Semantics};
+use nearmiss::{
+    Budget, CollideOptions, Deadline, Detail, Evidence, MeshQuality, Metric, Semantics, Statistics,
+};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -142,4 +144,11 @@ impl Options {
         }
         budget
     }
+}
+
+/// Returns `true` if a limit of `budget` may have ended a question that has just been answered at this cost.
+pub(crate) fn may_have_ended(budget: &Budget, cost: &Statistics) -> bool {
+    let now = Deadline::within(Duration::ZERO);
+    budget.work.is_some_and(|most| cost.evaluations + cost.node_pairs >= most)
+        || budget.deadline.is_some_and(|end| end <= now)
 }

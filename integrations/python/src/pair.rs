@@ -12,6 +12,7 @@ use crate::each::each;
 use crate::failure::refused;
 use crate::frame::Frame;
 use crate::options::{OF_BUDGET, OF_DISTANCE, OF_MESHES, OF_SCANS, Options};
+use crate::penetration::{Penetration, PenetrationRecord};
 use crate::pool::ask;
 use crate::poses::{Placeable, both};
 use crate::things::{Mesh as Closable, Side};
@@ -244,12 +245,8 @@ impl<'a> Overlap<'a> {
         Ok(Self { pair, interiors, meshes, options })
     }
 
-    /// Returns both bounds, and the direction in which to move the second thing.
-    pub(crate) fn one(
-        &self,
-        py: Python<'_>,
-        poses: [Option<&Bound<'_, PyAny>>; 2],
-    ) -> PyResult<(f64, f64, [f64; 3])> {
+    /// Answers the question at one pose of each.
+    pub(crate) fn one(&self, py: Python<'_>, poses: [Option<&Bound<'_, PyAny>>; 2]) -> PyResult<Penetration> {
         let poses = both(self.pair.things(), poses)?;
         let budget = self.options.budget();
         // The closed parts are found when first asked for, without the interpreter.
@@ -274,7 +271,7 @@ impl<'a> Overlap<'a> {
             _ => None,
         });
         let Some(found) = found else { return Err(refused("expected the closed parts of a mesh")) };
-        Ok((found.lower, found.upper, found.direction))
+        Ok(Penetration(PenetrationRecord::new(&found)))
     }
 }
 

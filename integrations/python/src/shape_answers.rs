@@ -43,7 +43,7 @@ answer! {
     /// The answer of `Target.touch`.
     ShapeAnswer of ShapeRecord by touch_in_words {
         @verdict touches: ["separated", "touching"],
-        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided.
+        /// The evidence of the verdict: "certified" or "estimated"; None if it is undecided.
         evidence: Option<&'static str> = evidence_name,
         /// The reason why the verdict is undecided, in a word; else None.
         reason: Option<&'static str> = reason_name,
@@ -75,23 +75,21 @@ record! {
 }
 
 impl ShapeDistanceRecord {
-    /// The record of a distance; infinite bounds if there is nothing within the reach.
-    pub(crate) fn new(distance: Option<&nearmiss::ShapeDistance>) -> Self {
-        let Some(distance) = distance else {
-            let (lower, upper) = (f64::INFINITY, f64::INFINITY);
-            let points = [NOWHERE; 2];
-            let [point, point_of_shape] = points;
-            return Self {
-                point,
-                point_of_shape,
-                lower,
-                upper,
-                band: NONE,
-                source: -1,
-                evidence: -1,
-                _padding: [0; 7],
-            };
-        };
+    /// The record of a distance of which only this lower bound is known.
+    pub(crate) fn beyond(lower: f64) -> Self {
+        Self {
+            point: NOWHERE,
+            point_of_shape: NOWHERE,
+            lower,
+            upper: f64::INFINITY,
+            band: NONE,
+            source: -1,
+            evidence: -1,
+            _padding: [0; 7],
+        }
+    }
+
+    pub(crate) fn new(distance: &nearmiss::ShapeDistance) -> Self {
         let [point, point_of_shape] = distance.points;
         Self {
             point,
@@ -109,9 +107,9 @@ impl ShapeDistanceRecord {
 answer! {
     /// The answer of `Target.distance`.
     ShapeDistance of ShapeDistanceRecord by shape_distance_in_words {
-        /// A lower bound of the distance, a length; 0 if the two may touch.
+        /// A lower bound of the distance, a length, proven; 0 if the two may touch, or if nothing is known.
         lower: f64 = plain,
-        /// An upper bound of the distance: that of the two points.
+        /// An upper bound of the distance: that of the two points; infinite if it is too far.
         upper: f64 = plain,
         /// The nearest place of the scan, in the world; None if it is too far.
         point: Option<[f64; 3]> = vector,
@@ -122,7 +120,8 @@ answer! {
         /// The local spacing, below which the scan does not determine the truth, a length; None if it is too
         /// far.
         band: Option<f64> = number,
-        /// How well the lower bound is supported: "certified" or "estimated".
+        /// The evidence of the upper bound: "certified" if the nearest place belongs to a ball about a
+        /// point, "estimated" if it belongs to a tangent disc; None if it is too far.
         evidence: Option<&'static str> = evidence_name,
     }
 }
@@ -184,15 +183,17 @@ answer! {
     RayAnswer of RayRecord by ray_in_words {
         /// True if the ray hits the scan.
         hit: bool = is_one,
-        /// The distance from the origin to the hit, in lengths of the direction; None without a hit.
+        /// The distance from the origin to the hit, or how far a ball moves until it touches; None without a
+        /// hit. A length in the world, whatever the length of the direction.
         t: Option<f64> = number,
         /// The place that is hit, in the world; None without a hit.
         point: Option<[f64; 3]> = vector,
-        /// The unit normal there, on the side from which the ray comes; None without a hit.
+        /// The unit normal there: outwards if the scan is oriented (`Scan.is_oriented`), which may be along
+        /// the ray; otherwise to the side from which the ray comes. None without a hit.
         normal: Option<[f64; 3]> = vector,
         /// The index of the scanned point at the hit, in the input; None without a hit.
         source: Option<i64> = index,
-        /// How well the answer is supported: "certified" or "estimated".
+        /// The evidence of the hit, or of there being none: "certified" or "estimated".
         evidence: Option<&'static str> = evidence_name,
     }
 }

@@ -158,7 +158,7 @@ answer! {
     /// The answer of `sweep` and of `Target.sweep`.
     SweepAnswer of SweepRecord by sweep_in_words {
         @verdict hits: ["free", "impact"],
-        /// How well the verdict is supported: "certified" or "estimated"; None if it is undecided, and for
+        /// The evidence of the verdict: "certified" or "estimated"; None if it is undecided, and for
         /// the impact of a shape.
         evidence: Option<&'static str> = evidence_name,
         /// The reason why the verdict is undecided, in a word; else None.

@@ -1,12 +1,18 @@
 //! `Target`: a placed scan against shapes and rays.
 
-use nearmiss::{Budget, CollideOptions, Interior, Pose, Prepared as _, Ray, Scratch, ShapePlan};
+use nearmiss::{
+    CollideOptions, Detail, Evidence, Interior, Pose, Prepared as _, Ray, Scratch, Semantics, ShapePlan,
+    ShapeVerdict,
+};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::{Points, vector, wrong_shape};
 use crate::failure::refused;
 use crate::frame::{Frame, Source};
 use crate::hint::ShapeHint;
+use crate::options::{OF_BUDGET, Options};
+use crate::penetration::{Penetration, PenetrationRecord};
 use crate::pool::{ask, ask_each};
 use crate::record::{Record, array};
 use crate::shape::Shape;
@@ -33,7 +39,58 @@ struct Now<'a> {
 
 impl Now<'_> {
     fn target(&self) -> nearmiss::Target<'_> {
-        nearmiss::Target::new(self.frame.at(&self.pose), &self.plan)
+        self.by(&self.plan)
+    }
+
+    fn by(&self, plan: &ShapePlan) -> nearmiss::Target<'_> {
+        nearmiss::Target::new(self.frame.at(&self.pose), plan)
+    }
+
+    /// Prepares questions about distances up to `reach`.
+    fn within(&self, reach: f64) -> PyResult<Within<'_>> {
+        if reach.is_nan() || reach < 0.0 {
+            return Err(refused(format!("expected a reach of at least 0, got {reach}")));
+        }
+        let options = self.plan.options();
+        let is_exact = matches!(options.semantics, Semantics::Thickened(_));
+        let is_proven = is_exact || options.evidence == Evidence::Certified;
+        let beyond = if is_proven && reach.is_finite() {
+            let asked = options.with_margin(reach).with_detail(Detail::Verdict);
+            Some(self.by(&ShapePlan::new(&asked, &self.frame).map_err(refused)?))
+        } else {
+            None
+        };
+        Ok(Within { target: self.target(), reach, beyond })
+    }
+}
+
+/// Questions about distances up to a reach.
+struct Within<'a> {
+    target: nearmiss::Target<'a>,
+    reach: f64,
+    /// The target with the reach as its margin; `None` if nothing is proven about what is beyond the reach.
+    beyond: Option<nearmiss::Target<'a>>,
+}
+
+impl Within<'_> {
+    fn distance(&self, shape: &nearmiss::Shape<'_>, scratch: &mut Scratch) -> ShapeDistanceRecord {
+        match self.target.distance(shape, self.reach, scratch) {
+            Some(found) => ShapeDistanceRecord::new(&found),
+            None => ShapeDistanceRecord::beyond(self.lower(shape, scratch)),
+        }
+    }
+
+    /// Returns a lower bound of the distance of a shape that is further than the reach from all discs and
+    /// balls: the reach, unless the obstacle may be nearer than its discs. 0 for an invalid shape.
+    fn lower(&self, shape: &nearmiss::Shape<'_>, scratch: &mut Scratch) -> f64 {
+        let Some(beyond) = &self.beyond else { return 0.0 };
+        match beyond.touch(shape, scratch).verdict {
+            ShapeVerdict::Separated { evidence: Evidence::Certified } => self.reach,
+            _ => {
+                let found = self.target.distance(shape, f64::INFINITY, scratch);
+                found.map_or(0.0, |found| found.lower.min(self.reach))
+            }
+        }
     }
 }
 
@@ -54,22 +111,6 @@ impl Target {
         let frame = self.source.frame(py);
         let plan = ShapePlan::new(&self.options, &frame).map_err(refused)?;
         Ok(Now { frame, pose: self.pose, plan })
-    }
-
-    /// Asks about each of a sequence of shapes.
-    fn each<'py, R: Record + Send>(
-        &self,
-        given: &Bound<'py, PyAny>,
-        question: impl Fn(&nearmiss::Target<'_>, &nearmiss::Shape<'_>, &mut Scratch) -> R + Sync,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let kept: Vec<Bound<'py, Shape>> = given.extract().map_err(|_cause| {
-            refused("expected a sequence of Shape, got something else; make them, as by Shape.sphere")
-        })?;
-        let shapes: Vec<nearmiss::Shape<'_>> = kept.iter().map(|shape| shape.get().convex()).collect();
-        let now = self.now(given.py())?;
-        let target = now.target();
-        let answers = ask_each(given.py(), shapes.len(), |i, scratch| question(&target, &shapes[i], scratch));
-        array(given.py(), answers?)
     }
 
     /// Reads one ray.
@@ -99,6 +140,19 @@ impl Target {
         let one_of = |all: &[[f64; 3]], i: usize| all[if all.len() == 1 { 0 } else { i }];
         (0..count).map(|i| made([one_of(&starts, i), one_of(&ways, i)], [max, radius], i)).collect()
     }
+}
+
+/// Asks about each of a sequence of shapes.
+fn each<'py, R: Record + Send>(
+    given: &Bound<'py, PyAny>,
+    question: impl Fn(&nearmiss::Shape<'_>, &mut Scratch) -> R + Sync,
+) -> PyResult<Bound<'py, PyAny>> {
+    let kept: Vec<Bound<'py, Shape>> = given.extract().map_err(|_cause| {
+        refused("expected a sequence of Shape, got something else; make them, as by Shape.sphere")
+    })?;
+    let shapes: Vec<nearmiss::Shape<'_>> = kept.iter().map(|shape| shape.get().convex()).collect();
+    let answers = ask_each(given.py(), shapes.len(), |i, scratch| question(&shapes[i], scratch));
+    array(given.py(), answers?)
 }
 
 /// Checks the greatest length and the radius of rays.
@@ -138,34 +192,33 @@ impl Target {
     /// Answer `touch` for a sequence of shapes on all cores. Returns a structured array of shape (N,)
     /// with the fields of a `ShapeAnswer`.
     fn touch_each<'py>(&self, shapes: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.each(shapes, |target, shape, scratch| ShapeRecord::new(&target.touch(shape, scratch)))
+        let now = self.now(shapes.py())?;
+        let target = now.target();
+        each(shapes, |shape, scratch| ShapeRecord::new(&target.touch(shape, scratch)))
     }
 
-    /// Bound the distance of a shape and the scan: lower ≤ distance ≤ upper. Both are infinite if
-    /// nothing is within the length `within`. Returns a `ShapeDistance`.
+    /// Bound the distance of a shape and the scan: lower ≤ distance ≤ upper. If nothing is within the length
+    /// `within`, the upper bound is infinite, and the lower one at most `within`. Returns a `ShapeDistance`.
     #[pyo3(signature = (shape, within = f64::INFINITY))]
     fn distance(&self, shape: &Bound<'_, Shape>, within: f64) -> PyResult<ShapeDistance> {
-        check_reach(within)?;
         let (py, convex) = (shape.py(), shape.get().convex());
         let now = self.now(py)?;
-        let record = |scratch: &mut Scratch| {
-            ShapeDistanceRecord::new(now.target().distance(&convex, within, scratch).as_ref())
-        };
-        Ok(ShapeDistance(ask(py, record)))
+        let question = now.within(within)?;
+        Ok(ShapeDistance(ask(py, |scratch| question.distance(&convex, scratch))))
     }
 
     /// Answer `distance` for a sequence of shapes on all cores. Returns a structured array of shape
     /// (N,) with the fields of a `ShapeDistance`.
     #[pyo3(signature = (shapes, within = f64::INFINITY))]
     fn distance_each<'py>(&self, shapes: &Bound<'py, PyAny>, within: f64) -> PyResult<Bound<'py, PyAny>> {
-        check_reach(within)?;
-        self.each(shapes, |target, shape, scratch| {
-            ShapeDistanceRecord::new(target.distance(shape, within, scratch).as_ref())
-        })
+        let now = self.now(shapes.py())?;
+        let question = now.within(within)?;
+        each(shapes, |shape, scratch| question.distance(shape, scratch))
     }
 
     /// Return up to eight contacts of a shape, as a structured array of shape (N,). The first is the
-    /// deepest; each of the others is the candidate furthest from all earlier ones.
+    /// deepest; each of the others is the candidate furthest from all earlier ones. No limit ends the search
+    /// early; `touch` tells the evidence of a contact.
     ///
     /// Its fields are `point`, `normal` (the direction in which the shape moves out), `depth` (negative
     /// for a gap within the margin) and `id`, which stays the same from frame to frame with a `hint`.
@@ -190,16 +243,23 @@ impl Target {
     /// Bound the length of the shortest move that takes a shape out of the scan. With `solid`, the surface
     /// of the scan encloses a solid; otherwise the way out may lead to either side.
     ///
-    /// Returns (lower, upper, direction): the shape is free if it moves by `upper` along the direction,
-    /// and no move shorter than `lower` frees it. Both are 0 for a shape that touches nothing.
-    #[pyo3(signature = (shape, *, solid = false))]
-    fn penetration(&self, shape: &Bound<'_, Shape>, solid: bool) -> PyResult<(f64, f64, [f64; 3])> {
+    /// Returns a `Penetration`: the shape is free if it moves by `upper` along `direction`, and no move
+    /// shorter than `lower` frees it. Both are 0 for a shape that touches nothing. Options are `work` (a test
+    /// of the shape is one unit) and `seconds`.
+    #[pyo3(signature = (shape, *, solid = false, **options))]
+    fn penetration(
+        &self,
+        shape: &Bound<'_, Shape>,
+        solid: bool,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Penetration> {
         let (py, convex) = (shape.py(), shape.get().convex());
         let now = self.now(py)?;
+        let options = Options::new(options, OF_BUDGET, now.frame.metric())?;
         let interior = if solid { Interior::Solid } else { Interior::Hollow };
         let found =
-            ask(py, |scratch| now.target().penetration(&convex, interior, &Budget::UNLIMITED, scratch));
-        Ok((found.lower, found.upper, found.direction))
+            ask(py, |scratch| now.target().penetration(&convex, interior, &options.budget(), scratch));
+        Ok(Penetration(PenetrationRecord::new(&found)))
     }
 
     /// Prove that a shape stays clear of the scan during a whole motion, by more than the margin, or find the
@@ -218,7 +278,7 @@ impl Target {
     /// Find the first place where a ray, or a ball of `radius` along it, hits the scan.
     ///
     /// `origin` and `direction` have shape (3,); the direction need not be a unit vector. `max` is the
-    /// greatest length. Returns a `RayAnswer`, whose `t` is a length.
+    /// greatest length. Returns a `RayAnswer`, whose `t` is a length, not a multiple of the direction.
     #[pyo3(signature = (origin, direction, *, max = f64::INFINITY, radius = 0.0))]
     fn cast(
         &self,
@@ -268,9 +328,4 @@ impl Target {
         };
         array(py, found.iter().map(record).collect())
     }
-}
-
-/// Checks the reach of a distance.
-fn check_reach(within: f64) -> PyResult<()> {
-    if within >= 0.0 { Ok(()) } else { Err(refused(format!("expected a reach of at least 0, got {within}"))) }
 }

@@ -1,11 +1,11 @@
 //! `World`: many placed scans, meshes and convex shapes.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nearmiss::{
-    AsShape, Bodies, Body, BodyId, BodyInterior, BodyPair, CollidePlan, DistanceOptions, DistancePlan,
-    Interior, Mesh as PreparedMesh, MeshScanPlan, Metric, PlacedBody, Pose, Scan as PreparedScan, Scratch,
-    Shape as Convex, ShapePlan, World as Crowd,
+    AsShape, Bodies, Body, BodyId, BodyInterior, BodyPair, CollideOptions, CollidePlan, DistanceOptions,
+    DistancePlan, Interior, Mesh as PreparedMesh, MeshScanPlan, Metric, PlacedBody, Pose,
+    Scan as PreparedScan, Scratch, Shape as Convex, ShapePlan, World as Crowd,
 };
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
@@ -16,6 +16,7 @@ use crate::cloud::rows;
 use crate::failure::refused;
 use crate::options::{OF_DISTANCE, OF_NEAREST, OF_SCANS, Options};
 use crate::pair::interiors;
+use crate::penetration::{Penetration, PenetrationRecord};
 use crate::pool::{ask, ask_each};
 use crate::poses::Poses;
 use crate::record::array;
@@ -29,7 +30,16 @@ type Placed = Crowd<PreparedScan, PreparedMesh, Arc<Shape>>;
 /// Placed scans, meshes and shapes, each with an id.
 #[pyclass(frozen, module = "nearmiss")]
 #[derive(Debug)]
-pub(crate) struct World(Mutex<Placed>);
+pub(crate) struct World(Mutex<Latest>);
+
+/// The bodies as they are now.
+#[derive(Debug)]
+struct Latest {
+    /// Shared with questions in progress. A change copies the bodies first if there is one.
+    bodies: Arc<Placed>,
+    /// Ids from this one on have not been given to a body.
+    next: u64,
+}
 
 impl AsShape for Shape {
     fn as_shape(&self) -> Convex<'_> {
@@ -75,28 +85,48 @@ impl Plans {
 }
 
 fn no_body(id: u64) -> PyErr {
-    PyKeyError::new_err(format!("expected the id of a body of this world, got {id}"))
+    PyKeyError::new_err(format!("expected the id of a body of this world, got {id}; `ids` lists them"))
 }
 
 impl World {
-    fn with<T>(&self, work: impl FnOnce(&mut Placed) -> T) -> T {
-        let mut world = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        work(&mut world)
+    fn lock(&self) -> MutexGuard<'_, Latest> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A copy, which costs references: other threads can change the world meanwhile.
-    fn copy(&self) -> Placed {
-        self.with(|world| world.clone())
+    /// Returns the bodies as they are now. Other threads can change the world meanwhile.
+    fn now(&self) -> Arc<Placed> {
+        Arc::clone(&self.lock().bodies)
     }
 
-    fn pose(&self, id: u64, pose: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
-        let poses = Poses::new(pose)?;
-        self.with(|world| match world.body(BodyId(id)).ok_or_else(|| no_body(id))? {
-            PlacedBody::Scan(scan) => poses.one(scan.scan()),
-            PlacedBody::Mesh(mesh) => poses.one(mesh.mesh()),
-            PlacedBody::Shape(_) => poses.one_of_shape(),
-        })
+    /// Changes the bodies.
+    fn change<T>(&self, work: impl FnOnce(&mut Placed) -> T) -> T {
+        work(Arc::make_mut(&mut self.lock().bodies))
     }
+
+    /// Inserts a body and returns its id.
+    fn add(&self, body: Body<PreparedScan, PreparedMesh, Arc<Shape>>, pose: &Pose) -> u64 {
+        let mut latest = self.lock();
+        let BodyId(id) = Arc::make_mut(&mut latest.bodies).insert_body(body, pose);
+        latest.next = id + 1;
+        id
+    }
+
+    /// Checks that the world has, or had, bodies with the ids of all pairs.
+    fn check_pairs(&self, pairs: &[[u64; 2]]) -> PyResult<()> {
+        let next = self.lock().next;
+        pairs.as_flattened().iter().find(|&&id| id >= next).map_or(Ok(()), |&id| Err(no_body(id)))
+    }
+}
+
+/// Returns ids of bodies that the world has; `None` for all bodies.
+fn ids_of(world: &Placed, of: Option<Vec<u64>>) -> PyResult<Option<Vec<BodyId>>> {
+    let id_of = |id| world.get(BodyId(id)).map(|_| BodyId(id)).ok_or_else(|| no_body(id));
+    of.map(|ids| ids.into_iter().map(id_of).collect()).transpose()
+}
+
+/// Returns the bodies of a list; all of them for `None`.
+fn bodies_of(ids: Option<&[BodyId]>) -> Bodies<'_> {
+    ids.map_or(Bodies::All, Bodies::These)
 }
 
 /// Returns the metric of the scans of a world, which must be the same.
@@ -111,28 +141,55 @@ fn metric_of(world: &Placed) -> PyResult<Metric> {
     }
 }
 
-/// Returns the plan of distances in a world.
-fn distance_plan(
-    world: &Placed,
-    given: Option<&Bound<'_, PyDict>>,
-    names: &[&str],
-) -> PyResult<(DistancePlan, Options)> {
-    let metric = metric_of(world)?;
-    let options = Options::new(given, names, metric)?;
-    let asked =
-        DistanceOptions::default().with_semantics(options.collide.semantics).with_relative(options.relative);
-    Ok((DistancePlan::of_metric(&asked, metric).map_err(refused)?, options))
+/// The plans of questions about distances.
+struct DistancePlans {
+    all: DistancePlan,
+    /// The plan about a scan and a shape, with the same meaning.
+    of_shape: ShapePlan,
+}
+
+impl DistancePlans {
+    fn new(world: &Placed, given: Option<&Bound<'_, PyDict>>, names: &[&str]) -> PyResult<(Self, Options)> {
+        let metric = metric_of(world)?;
+        let options = Options::new(given, names, metric)?;
+        let semantics = options.collide.semantics;
+        let asked = DistanceOptions::default().with_semantics(semantics).with_relative(options.relative);
+        let all = DistancePlan::of_metric(&asked, metric).map_err(refused)?;
+        let of_shape = CollideOptions::default().with_semantics(semantics);
+        let of_shape = ShapePlan::of_metric(&of_shape, metric).map_err(refused)?;
+        Ok((Self { all, of_shape }, options))
+    }
+
+    /// Bounds the distance of two bodies.
+    fn ask(&self, pair: &BodyPair<'_>, scratch: &mut Scratch) -> DistanceRecord {
+        let swapped = |record: DistanceRecord, is_swapped| if is_swapped { record.swapped() } else { record };
+        match pair {
+            BodyPair::Scans(pair) => DistanceRecord::new(&pair.distance(&self.all, scratch)),
+            BodyPair::MeshAndScan { pair, mesh_is_first } => {
+                swapped(DistanceRecord::new(&pair.distance(&self.all, scratch)), *mesh_is_first)
+            }
+            BodyPair::Meshes(pair) => DistanceRecord::of_meshes(&pair.distance(scratch.meshes())),
+            BodyPair::ShapeAndScan { pair, shape_is_first } => {
+                let found = pair.distance(&self.of_shape, f64::INFINITY, scratch);
+                let record = found.map_or(DistanceRecord::UNKNOWN, |found| DistanceRecord::of_shape(&found));
+                swapped(record, *shape_is_first)
+            }
+            _ => pair.distance(&self.all, scratch).map_or(DistanceRecord::UNKNOWN, |found| {
+                DistanceRecord::of_bodies((found.lower, found.upper), found.points, false)
+            }),
+        }
+    }
 }
 
 #[pymethods]
 impl World {
     #[new]
     fn new() -> Self {
-        Self(Mutex::new(Crowd::with_meshes_and_shapes()))
+        Self(Mutex::new(Latest { bodies: Arc::new(Crowd::with_meshes_and_shapes()), next: 0 }))
     }
 
     fn __len__(&self) -> usize {
-        self.with(|world| world.len())
+        self.lock().bodies.len()
     }
 
     fn __repr__(&self) -> String {
@@ -142,45 +199,48 @@ impl World {
     /// The ids of all bodies, in the order of insertion.
     #[getter]
     fn ids(&self) -> Vec<u64> {
-        self.with(|world| world.ids().map(|id| id.0).collect())
+        self.lock().bodies.ids().map(|id| id.0).collect()
     }
 
     /// Place a Scan, a Mesh or a Shape at `pose`, of shape (4, 4), and return the id of the new body.
     #[pyo3(signature = (body, pose = None))]
     fn insert(&self, body: &Bound<'_, PyAny>, pose: Option<&Bound<'_, PyAny>>) -> PyResult<u64> {
         let poses = Poses::new(pose)?;
-        let id = if let Ok(scan) = body.cast::<Scan>() {
+        let (body, pose) = if let Ok(scan) = body.cast::<Scan>() {
             let scan = &scan.get().0;
-            let pose = poses.one(&**scan)?;
-            self.with(|world| world.insert(scan.clone(), &pose))
+            (Body::Scan(scan.clone()), poses.one(&**scan)?)
         } else if let Ok(mesh) = body.cast::<Mesh>() {
             let mesh = &mesh.get().mesh;
-            let pose = poses.one(mesh)?;
-            self.with(|world| world.insert_mesh(mesh.clone(), &pose))
+            (Body::Mesh(mesh.clone()), poses.one(mesh)?)
         } else if let Ok(shape) = body.cast::<Shape>() {
-            let (shape, pose) = (Arc::new(shape.get().clone()), poses.one_of_shape()?);
-            self.with(|world| world.insert_shape(shape, &pose))
+            (Body::Shape(Arc::new(shape.get().clone())), poses.one_of_shape()?)
         } else {
             let class = body.get_type().name()?;
             let told = format!("expected a Scan, a Mesh or a Shape, got {class}");
             return Err(PyTypeError::new_err(told));
         };
-        Ok(id.0)
+        Ok(self.add(body, &pose))
     }
 
     /// Remove a body. Raises `KeyError` for an unknown id.
     fn remove(&self, id: u64) -> PyResult<()> {
-        self.with(|world| world.remove_body(BodyId(id))).map(drop).ok_or_else(|| no_body(id))
+        self.change(|world| world.remove_body(BodyId(id))).map(drop).ok_or_else(|| no_body(id))
     }
 
     /// Move a body to `pose`, of shape (4, 4). Raises `KeyError` for an unknown id.
     fn move_to(&self, id: u64, pose: &Bound<'_, PyAny>) -> PyResult<()> {
-        let pose = self.pose(id, Some(pose))?;
-        if self.with(|world| world.move_to(BodyId(id), &pose)) { Ok(()) } else { Err(no_body(id)) }
+        let poses = Poses::new(Some(pose))?;
+        let pose = match self.lock().bodies.body(BodyId(id)).ok_or_else(|| no_body(id))? {
+            PlacedBody::Scan(scan) => poses.one(scan.scan())?,
+            PlacedBody::Mesh(mesh) => poses.one(mesh.mesh())?,
+            PlacedBody::Shape(_) => poses.one_of_shape()?,
+        };
+        if self.change(|world| world.move_to(BodyId(id), &pose)) { Ok(()) } else { Err(no_body(id)) }
     }
 
-    /// Return the pairs of ids, of shape (N, 2), whose bounding boxes come within the length `reach`; of
-    /// all bodies, or those with a body in the list `of`. All other pairs are further apart.
+    /// Return the pairs of ids, of shape (N, 2), whose bounding boxes come within the length `reach`; of all
+    /// bodies, or those with a body in the list `of`. All other pairs are further apart. Raises `KeyError`
+    /// for an unknown id.
     #[pyo3(signature = (reach = 0.0, of = None))]
     fn near_pairs<'py>(
         &self,
@@ -189,8 +249,8 @@ impl World {
         of: Option<Vec<u64>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         check_reach(reach)?;
-        let world = self.copy();
-        let pairs = near(py, &world, reach, of.as_deref());
+        let world = self.now();
+        let pairs = near(py, &world, reach, ids_of(&world, of)?.as_deref());
         let flat: Vec<u64> = pairs.iter().flatten().map(|id| id.0).collect();
         rows(py, flat, &[pairs.len(), 2])
     }
@@ -199,7 +259,7 @@ impl World {
     ///
     /// Returns the pairs of ids, of shape (N, 2), and a structured array of answers, of shape (N,), as
     /// `Scan.collide_each` does. Options are those of `Scan.collide`. Shapes are solid, and have no normals
-    /// and no sources.
+    /// and no sources. Raises `KeyError` for an unknown id in `of`.
     #[pyo3(signature = (of = None, **options))]
     fn collide<'py>(
         &self,
@@ -207,11 +267,12 @@ impl World {
         of: Option<Vec<u64>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let world = self.copy();
+        let world = self.now();
+        let ids = ids_of(&world, of)?;
         let metric = metric_of(&world)?;
         let options = Options::new(options, OF_SCANS, metric)?;
         let plans = Plans::new(&world, &options, metric)?;
-        let pairs = near(py, &world, plans.collide.reach(), of.as_deref());
+        let pairs = near(py, &world, plans.collide.reach(), ids.as_deref());
         let answers = ask_each(py, pairs.len(), |i, scratch| {
             let pair = world.body_pair(pairs[i]).map(|pair| pair.within(&options.budget()));
             let unasked = || AnswerRecord::new(&nearmiss::Answer::UNASKED);
@@ -221,9 +282,9 @@ impl World {
         Ok((rows(py, flat, &[pairs.len(), 2])?, array(py, answers)?))
     }
 
-    /// Bound the distance of two bodies: lower ≤ distance ≤ upper. Returns a `Distance`, without sources
-    /// and a band for shapes. Options are those of `Scan.distance`; `work` and `seconds` do not limit pairs
-    /// with a shape. Raises `KeyError` for an unknown id.
+    /// Bound the distance of two bodies: lower ≤ distance ≤ upper. Returns a `Distance`. Options are those of
+    /// `Scan.distance`; `work` and `seconds` do not limit pairs with a shape. Raises `KeyError` for an
+    /// unknown id.
     #[pyo3(signature = (a, b, **options))]
     fn distance(
         &self,
@@ -232,22 +293,22 @@ impl World {
         b: u64,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Distance> {
-        let world = self.copy();
-        let (plan, options) = distance_plan(&world, options, OF_DISTANCE)?;
+        let world = self.now();
+        let (plans, options) = DistancePlans::new(&world, options, OF_DISTANCE)?;
         if let Some(id) = [a, b].into_iter().find(|&id| world.body(BodyId(id)).is_none()) {
             return Err(no_body(id));
         }
         let pair = world.body_pair([BodyId(a), BodyId(b)]).ok_or_else(|| no_body(a))?;
         let pair = pair.within(&options.budget());
-        Ok(Distance(ask(py, |scratch| distance(&pair, &plan, scratch))))
+        Ok(Distance(ask(py, |scratch| plans.ask(&pair, scratch))))
     }
 
     /// Bound the length of the shortest move that takes the body `b` out of the body `a`. `solid` names
     /// scans whose surface encloses a solid: "a", "b" or "both". Shapes and the closed parts of meshes are
     /// solid anyway.
     ///
-    /// Returns (lower, upper, direction), as `Scan.penetration` does. Options are those of `Scan.collide`;
-    /// `margin` needs a scan. Raises `KeyError` for an unknown id.
+    /// Returns a `Penetration`, as `Scan.penetration` does. Options are those of `Scan.collide`; `margin`
+    /// needs a scan, and `work` and `seconds` do not limit two shapes. Raises `KeyError` for an unknown id.
     #[pyo3(signature = (a, b, *, solid = None, **options))]
     fn penetration(
         &self,
@@ -256,8 +317,8 @@ impl World {
         b: u64,
         solid: Option<&str>,
         options: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<(f64, f64, [f64; 3])> {
-        let world = self.copy();
+    ) -> PyResult<Penetration> {
+        let world = self.now();
         let metric = metric_of(&world)?;
         let options = Options::new(options, OF_SCANS, metric)?;
         let plan = CollidePlan::of_metric(&options.collide, metric).map_err(refused)?;
@@ -274,15 +335,17 @@ impl World {
             let interiors = [interior(bodies[0], own), interior(bodies[1], other)];
             pair.penetration(&plan, interiors, &options.budget(), scratch)
         });
-        Ok((found.lower, found.upper, found.direction))
+        Ok(Penetration(PenetrationRecord::new(&found)))
     }
 
     /// Find the two bodies that are nearest to each other, of those whose bounding boxes come within the
-    /// length `reach`. Pairs of ids in `ignore` do not count, such as neighbouring links of a robot.
+    /// length `reach`; of all pairs, or those with a body in the list `of`. Pairs of ids in `ignore` do not
+    /// count, such as neighbouring links of a robot. They may name bodies that were removed.
     ///
-    /// Returns the ids and a `Distance` without sources and a band, or None if no pair counts. The lower
-    /// bound is at most `reach`, and holds for all pairs that count. Options are `thickened`, `surface_only`
-    /// and `relative`.
+    /// Returns the ids and a `Distance` without sources, and for a scan without evidence and band, which
+    /// `distance` tells; or None if no pair counts. The lower bound is at most `reach`, and holds for all
+    /// pairs that count. Options are `thickened`, `surface_only` and `relative`. Raises `KeyError` for an
+    /// unknown id.
     #[pyo3(signature = (reach = f64::INFINITY, *, ignore = Vec::new(), of = None, **options))]
     fn nearest(
         &self,
@@ -293,17 +356,18 @@ impl World {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Option<([u64; 2], Distance)>> {
         check_reach(reach)?;
-        let world = self.copy();
-        let (plan, _) = distance_plan(&world, options, OF_NEAREST)?;
+        self.check_pairs(&ignore)?;
+        let world = self.now();
+        let ids = ids_of(&world, of)?;
+        let (plans, _) = DistancePlans::new(&world, options, OF_NEAREST)?;
         let found = ask(py, |scratch| {
-            let ids: Option<Vec<BodyId>> = of.map(|ids| ids.into_iter().map(BodyId).collect());
-            let bodies = ids.as_deref().map_or(Bodies::All, Bodies::These);
             let counts =
                 |a: BodyId, b: BodyId| !ignore.contains(&[a.0, b.0]) && !ignore.contains(&[b.0, a.0]);
-            world.nearest_pair(bodies, reach, counts, &plan, scratch)
+            world.nearest_pair(bodies_of(ids.as_deref()), reach, counts, &plans.all, scratch)
         });
         Ok(found.map(|found| {
-            let record = DistanceRecord::of_bodies((found.lower, found.upper), found.points);
+            let has_scan = found.ids.iter().any(|&id| world.placed(id).is_some());
+            let record = DistanceRecord::of_bodies((found.lower, found.upper), found.points, has_scan);
             (found.ids.map(|id| id.0), Distance(record))
         }))
     }
@@ -318,21 +382,6 @@ fn interior(body: &Body<PreparedScan, PreparedMesh, Arc<Shape>>, of_scan: Interi
     }
 }
 
-/// Bounds the distance of two bodies.
-fn distance(pair: &BodyPair<'_>, plan: &DistancePlan, scratch: &mut Scratch) -> DistanceRecord {
-    match pair {
-        BodyPair::Scans(pair) => DistanceRecord::new(&pair.distance(plan, scratch)),
-        BodyPair::MeshAndScan { pair, mesh_is_first } => {
-            let found = DistanceRecord::new(&pair.distance(plan, scratch));
-            if *mesh_is_first { found.swapped() } else { found }
-        }
-        BodyPair::Meshes(pair) => DistanceRecord::of_meshes(&pair.distance(scratch.meshes())),
-        _ => pair.distance(plan, scratch).map_or(DistanceRecord::UNKNOWN, |found| {
-            DistanceRecord::of_bodies((found.lower, found.upper), found.points)
-        }),
-    }
-}
-
 /// Checks a reach.
 fn check_reach(reach: f64) -> PyResult<()> {
     if reach.is_nan() || reach < 0.0 {
@@ -342,12 +391,10 @@ fn check_reach(reach: f64) -> PyResult<()> {
 }
 
 /// Returns the pairs near each other, without the interpreter.
-fn near(py: Python<'_>, world: &Placed, reach: f64, of: Option<&[u64]>) -> Vec<[BodyId; 2]> {
+fn near(py: Python<'_>, world: &Placed, reach: f64, of: Option<&[BodyId]>) -> Vec<[BodyId; 2]> {
     py.detach(|| {
         let mut pairs = Vec::new();
-        let ids: Option<Vec<BodyId>> = of.map(|ids| ids.iter().map(|&id| BodyId(id)).collect());
-        let bodies = ids.as_deref().map_or(Bodies::All, Bodies::These);
-        world.near_pairs(bodies, reach, &mut pairs);
+        world.near_pairs(bodies_of(of), reach, &mut pairs);
         pairs
     })
 }

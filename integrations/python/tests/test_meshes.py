@@ -35,10 +35,13 @@ class Meshes(unittest.TestCase):
             self.assertNotIn("nan", repr(answer).lower(), x)
             self.assertAlmostEqual(apart.upper, distance, delta=1e-9, msg=str(x))
             self.assertEqual(apart.lower, apart.upper, x)
-        lower, upper, direction = mesh.penetration(mesh, at(0.75))
-        self.assertTrue(0.1 < lower <= 0.25 <= upper < 0.26, (lower, upper))
-        self.assertGreater(direction[0], 0.99)
-        contacts = mesh.contacts(mesh, at(0.75, 0.1, 0.2))
+        out = mesh.penetration(mesh, at(0.75))
+        self.assertTrue(0.1 < out.lower <= 0.25 <= out.upper < 0.26, out)
+        self.assertGreater(out.direction[0], 0.99)
+        self.assertEqual((out.evidence, out.band, out.complete), ("certified", 0.0, True))
+        self.assertFalse(mesh.penetration(mesh, at(0.75), work=1).complete)
+        answer, contacts = mesh.contacts(mesh, at(0.75, 0.1, 0.2))
+        self.assertEqual((answer.touches, answer.evidence, answer.complete), (True, "certified", True))
         self.assertEqual(contacts["ends"].shape[1:], (2, 3))
         self.assertLess(np.abs(contacts["point"] - contacts["ends"].mean(axis=1)).max(), 1e-9)
 
@@ -69,13 +72,17 @@ class Meshes(unittest.TestCase):
 
     def test_a_mesh_and_a_scan_move_out_of_each_other(self):
         mesh, scan, near = nearmiss.Mesh.read(DRAGON), dragon(), np.array([0.09, 0.03, 0.01])
-        _, exact, _ = mesh.penetration(mesh, at(*near))
+        exact = mesh.penetration(mesh, at(*near)).upper
+        whole, contacts = mesh.contacts(mesh, at(*near))
+        hasty, some = mesh.contacts(mesh, at(*near), work=whole.node_pairs // 4)
+        self.assertEqual((whole.complete, hasty.complete), (True, False))
+        self.assertLess(len(some), len(contacts))
         for a, b, solid, wrong in ((scan, mesh, "a", "b"), (mesh, scan, "b", "both")):
-            lower, upper, way = a.penetration(b, at(*near), solid=solid)
-            self.assertTrue(0.0 <= lower <= upper, (lower, upper))
-            self.assertLess(abs(upper - exact), 2.0 * scan.sampling_radius)
-            free = at(*(near + 1.001 * upper * np.array(way)))
-            self.assertEqual(a.penetration(b, free, solid=solid)[1], 0.0)
+            out = a.penetration(b, at(*near), solid=solid)
+            self.assertTrue(0.0 <= out.lower <= out.upper, out)
+            self.assertLess(abs(out.upper - exact), 2.0 * scan.sampling_radius)
+            free = at(*(near + 1.001 * out.upper * np.array(out.direction)))
+            self.assertEqual(a.penetration(b, free, solid=solid).upper, 0.0)
             with self.assertRaisesRegex(ValueError, "to name scans"):
                 a.penetration(b, solid=wrong)
         with self.assertRaisesRegex(ValueError, "to name scans"):

@@ -156,6 +156,7 @@ class Concurrency(unittest.TestCase):
             target.touch(ball),
             target.distance(ball),
             target.cast([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]),
+            target.penetration(ball),
             nearmiss.sweep(scan, scan, [away, nearmiss.pose(translation=[0.4, 0.0, 0.0])]),
         ]:
             with self.subTest(type(answer).__name__):

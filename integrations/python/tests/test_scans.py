@@ -252,14 +252,40 @@ class Questions(unittest.TestCase):
     def test_contacts_and_manifolds_are_arrays(self):
         scan = dragon()
         pose = nearmiss.pose(translation=[0.09, 0.03, 0.01])
-        contacts, manifold = scan.contacts(scan, pose), scan.manifold(scan, pose, hint=nearmiss.Hint())
+        answer, contacts = scan.contacts(scan, pose)
+        other, manifold = scan.manifold(scan, pose, hint=nearmiss.Hint())
+        for told in (answer, other, scan.collide(scan, pose)):
+            self.assertEqual((told.touches, told.complete), (True, True), told)
         self.assertGreater(len(contacts), 3)
         self.assertTrue(1 <= len(manifold) <= 8)
         self.assertEqual(manifold["gap"][0], manifold["gap"].min(), "the deepest comes first")
         np.testing.assert_allclose(np.linalg.norm(manifold["normal"], axis=1), 1, atol=1e-6)
         low, high = scan.bounds
         self.assertTrue(((contacts["point"] > low - 0.01) & (contacts["point"] < high + 0.01)).all())
-        self.assertEqual(scan.contacts(scan, nearmiss.pose(translation=[9, 0, 0])).shape, (0,))
+        apart, none = scan.contacts(scan, nearmiss.pose(translation=[9, 0, 0]))
+        self.assertEqual((apart.touches, apart.complete, none.shape), (False, True, (0,)))
+
+    def test_budgets_tell_whether_lists_are_complete(self):
+        scan, pose = dragon(), nearmiss.pose(translation=[0.09, 0.03, 0.01])
+        whole, all_contacts = scan.contacts(scan, pose)
+        hasty, some = scan.contacts(scan, pose, work=(whole.node_pairs + whole.evaluations) // 4)
+        self.assertFalse(hasty.complete)
+        self.assertLess(len(some), len(all_contacts))
+        none, empty = scan.contacts(scan, pose, work=1)
+        self.assertEqual((none.verdict, none.reason, none.complete, len(empty)), ("undecided", "budget", False, 0))
+        self.assertTrue(scan.contacts(scan, pose, work=10**9, seconds=600)[0].complete)
+        whole, _ = scan.manifold(scan, pose, work=10**9)
+        cost = whole.node_pairs + whole.evaluations
+        self.assertTrue(whole.complete)
+        for work in (1, cost // 2, cost - 1):
+            hasty, some = scan.manifold(scan, pose, work=work)
+            self.assertFalse(hasty.complete, work)
+            self.assertLessEqual(len(some), 8)
+            self.assertEqual(len(some) > 0, hasty.touches is True, work)
+        self.assertFalse(scan.manifold(scan, pose, seconds=0.0)[0].complete)
+        self.assertFalse(scan.collide(scan, pose, work=1).complete)
+        self.assertEqual(scan.collide_each(scan, [pose], work=1)["complete"].tolist(), [False])
+        self.assertEqual(scan.collide_each(scan, [pose])["complete"].tolist(), [True])
 
     def test_misaligned_arrays_are_copied(self):
         points = plate(count=20)

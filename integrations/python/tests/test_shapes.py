@@ -52,20 +52,54 @@ class Shapes(unittest.TestCase):
 
     def test_penetration_is_the_way_out(self):
         target = self.floor.target()
-        lower, upper, way = target.penetration(Shape.sphere([0.5, 0.5, 0.06], 0.1))
-        self.assertLessEqual(lower, 0.04 + 1e-9)
-        self.assertGreater(lower, 0.035)
-        self.assertAlmostEqual(upper, 0.04, 2)
-        self.assertGreater(way[2], 0.98)
-        self.assertEqual(target.penetration(Shape.sphere([0.5, 0.5, 0.3], 0.1))[:2], (0.0, 0.0))
+        ball = Shape.sphere([0.5, 0.5, 0.06], 0.1)
+        out = target.penetration(ball)
+        self.assertLessEqual(out.lower, 0.04 + 1e-9)
+        self.assertGreater(out.lower, 0.035)
+        self.assertAlmostEqual(out.upper, 0.04, 2)
+        self.assertGreater(out.direction[2], 0.98)
+        self.assertTrue(out.complete)
+        self.assertGreater(out.band, 0.0)
+        self.assertRegex(repr(out), r"^<Penetration between 0\.0\d+ and 0\.0\d+, (certified|estimated)>$")
+        free = target.penetration(Shape.sphere([0.5, 0.5, 0.3], 0.1))
+        self.assertEqual((free.lower, free.upper, free.direction), (0.0, 0.0, [0.0] * 3))
+        for limit in ({"work": 3}, {"seconds": 0.0}):
+            hasty = target.penetration(ball, **limit)
+            self.assertFalse(hasty.complete, limit)
+            self.assertTrue(hasty.lower <= 0.04 + 1e-9 and hasty.upper >= 0.04 - 1e-3, (limit, hasty))
+        self.assertTrue(target.penetration(ball, work=10**6).complete)
+        with self.assertRaisesRegex(TypeError, "options among work, seconds, got `margin`"):
+            target.penetration(ball, margin=0.1)
+        with self.assertRaisesRegex(TypeError, "answer.lower"):
+            bool(out)
+
+    def test_lower_bounds_hold_beyond_the_reach(self):
+        ball, low = Shape.sphere([0.5, 0.5, 0.3], 0.1), Shape.sphere([0.5, 0.5, 0.103], 0.1)
+        for options in ({}, {"thickened": 0.01}, {"evidence": "estimated"}):
+            target = self.floor.target(**options)
+            whole = target.distance(ball)
+            for within in (0.0, 0.05, 0.15, 0.999 * whole.upper):
+                found = target.distance(ball, within)
+                self.assertEqual((found.upper, found.point, found.evidence), (np.inf, None, None), (options, within))
+                self.assertLessEqual(found.lower, within, options)
+                self.assertEqual(target.distance_each([ball], within)["lower"][0], found.lower, options)
+            expected = 0.0 if "evidence" in options else 0.05
+            self.assertEqual(target.distance(ball, 0.05).lower, expected, options)
+            self.assertAlmostEqual(target.distance(ball, 1.0).lower, whole.lower, 6, options)
+        # Just above the floor, the obstacle may be nearer than its discs.
+        near = self.floor.target().distance(low, 0.002)
+        self.assertTrue(0.0 <= near.lower <= 0.002 and near.upper == np.inf, near)
 
     def test_scans_move_apart(self):
         near = nearmiss.pose(translation=[0.09, 0.03, 0.01])
-        lower, upper, way = dragon().penetration(dragon(), near, solid="both")
-        self.assertTrue(0 < lower <= upper < 0.1, (lower, upper))
-        moved = nearmiss.pose(translation=np.add([0.09, 0.03, 0.01], np.multiply(way, upper * (1 + 1e-6))))
+        out = dragon().penetration(dragon(), near, solid="both")
+        self.assertTrue(0 < out.lower <= out.upper < 0.1, out)
+        self.assertTrue(out.complete)
+        way = np.multiply(out.direction, out.upper * (1 + 1e-6))
+        moved = nearmiss.pose(translation=np.add([0.09, 0.03, 0.01], way))
         self.assertFalse(dragon().collide(dragon(), moved).touches)
-        self.assertEqual(dragon().penetration(dragon(), near)[0], 0.0)
+        self.assertEqual(dragon().penetration(dragon(), near).lower, 0.0)
+        self.assertFalse(dragon().penetration(dragon(), near, work=10).complete)
         with self.assertRaisesRegex(ValueError, 'expected `solid` to be "a", "b" or "both", got "c"'):
             dragon().penetration(dragon(), near, solid="c")
 
@@ -97,6 +131,14 @@ class Shapes(unittest.TestCase):
         self.assertFalse(target.cast([0.3, 0.3, 2], [0, 0, -1], max=1.0).hit)
         self.assertAlmostEqual(target.cast([0.3, 0.3, 2], [0, 0, -1], radius=0.1).t, 1.9, 6)
         self.assertEqual(len(target.cast_all([0.3, 0.3, 2], [0, 0, -1])), 1)
+        for length in (0.001, 1.0, 1000.0):
+            self.assertAlmostEqual(target.cast([0.3, 0.3, 2], [0, 0, -length]).t, 2.0, 6)
+        self.assertGreater(hit.normal[2], 0.99, "to the side of the ray")
+        self.assertLess(target.cast([0.3, 0.3, -2], [0, 0, 1]).normal[2], -0.99, "to the side of the ray")
+        oriented = nearmiss.Scan(plate(), scanner=[0.5, 0.5, 5.0])
+        self.assertTrue(oriented.is_oriented)
+        for origin, way in (([0.3, 0.3, 2], [0, 0, -1]), ([0.3, 0.3, -2], [0, 0, 1])):
+            self.assertGreater(oriented.target().cast(origin, way).normal[2], 0.99, "outwards")
         down = target.cast_each([[0.1, 0.1, 1], [5, 5, 1]], [0, 0, -1])
         self.assertEqual(down["hit"].tolist(), [True, False])
         self.assertTrue(np.isnan(down["t"][1]))
@@ -179,6 +221,17 @@ class Motions(unittest.TestCase):
         self.assertEqual(world.near_pairs(of=[ids[0]]).shape, (0, 2))
         world.remove(ids[1])
         self.assertEqual((len(world), world.ids), (11, [ids[0], *ids[2:]]))
+        for unknown in (ids[1], 99):
+            for ask in (
+                lambda: world.near_pairs(of=[ids[0], unknown]),
+                lambda: world.collide(of=[unknown]),
+                lambda: world.nearest(of=[unknown]),
+            ):
+                with self.assertRaisesRegex(KeyError, f"id of a body of this world, got {unknown}; `ids`"):
+                    ask()
+        with self.assertRaisesRegex(KeyError, "got 99; `ids`"):
+            world.nearest(ignore=[(ids[0], 99)])
+        self.assertIsNotNone(world.nearest(ignore=[(ids[0], ids[1])]), "a body that was removed")
         for call in (lambda: world.remove(ids[1]), lambda: world.move_to(99, np.eye(4))):
             with self.assertRaises(KeyError):
                 call()
@@ -208,6 +261,12 @@ class Motions(unittest.TestCase):
 
         gap = world.distance(ground, high)
         self.assertTrue(0.17 < gap.lower <= gap.upper and abs(gap.upper - 0.18) < 1e-6)
+        self.assertEqual((gap.evidence, gap.source_b, gap.complete), ("estimated", None, True), "a tangent disc")
+        self.assertTrue(gap.source_a >= 0 and gap.band > 0)
+        turned = world.distance(high, ground)
+        self.assertEqual((turned.source_a, turned.source_b, turned.upper), (None, gap.source_a, gap.upper))
+        exact = world.distance(mesh, high)
+        self.assertEqual((exact.evidence, exact.band, exact.source_a), ("certified", 0.0, None))
         np.testing.assert_allclose([gap.point_a[2], gap.point_b[2]], [0.0, 0.18], atol=1e-6)
         ids, nearest = world.nearest()
         self.assertEqual(nearest.upper, 0.0)
@@ -215,6 +274,8 @@ class Motions(unittest.TestCase):
         ids, nearest = world.nearest(ignore=ignore)
         self.assertEqual(list(ids), [ground, high])
         self.assertAlmostEqual(nearest.upper, 0.18, 6)
+        self.assertEqual((nearest.evidence, nearest.band, nearest.source_a), (None, None, None))
+        self.assertEqual(nearest.lower, gap.lower)
         self.assertIsNone(world.nearest(0.0, ignore=ignore, of=[high]))
         self.assertEqual(world.collide(margin=0.2)[1]["verdict"].tolist().count(1), 5)
         hasty = world.distance(ground, mesh, work=1)
@@ -222,13 +283,14 @@ class Motions(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "`seconds`"):
             world.nearest(seconds=1)
         for a, b, depth, up in ((ground, mesh, 0.1, 1), (mesh, ground, 0.1, -1), (low, high, 0.01, 1)):
-            lower, upper, direction = world.penetration(a, b)
-            self.assertTrue(lower <= depth + 1e-6 and abs(upper - depth) < 2e-3, (a, b, lower, upper))
-            self.assertGreater(up * direction[2], 0.99)
-        self.assertEqual(world.penetration(ground, high)[:2], (0.0, 0.0))
-        lower, upper, direction = world.penetration(ground, low)
-        self.assertTrue(lower <= 0.01 + 1e-6 and abs(upper - 0.01) < 2e-3 and direction[2] > 0.99)
-        self.assertGreater(world.penetration(ground, low, solid="a")[1], 0.0)
+            out = world.penetration(a, b)
+            self.assertTrue(out.lower <= depth + 1e-6 and abs(out.upper - depth) < 2e-3, (a, b, out))
+            self.assertGreater(up * out.direction[2], 0.99)
+        self.assertEqual(world.penetration(ground, high).upper, 0.0)
+        out = world.penetration(ground, low)
+        self.assertTrue(out.lower <= 0.01 + 1e-6 and abs(out.upper - 0.01) < 2e-3 and out.direction[2] > 0.99)
+        self.assertGreater(world.penetration(ground, low, solid="a").upper, 0.0)
+        self.assertTrue(out.complete and not world.penetration(ground, low, work=2).complete)
         with self.assertRaisesRegex(ValueError, "no `margin` for bodies"):
             world.penetration(low, high, margin=0.1)
         with self.assertRaisesRegex(ValueError, "to name scans, got 'b'|to name scans, got \"b\""):
@@ -253,6 +315,8 @@ class Motions(unittest.TestCase):
         self.assertEqual(robot.collide()[1]["verdict"].tolist(), [1])
         robot.move_to(hand, at(1.5, 0, 0))
         self.assertAlmostEqual(robot.distance(arm, hand).upper, 0.3, 6)
+        _, nearest = robot.nearest()
+        self.assertEqual((nearest.evidence, nearest.band), ("certified", 0.0))
 
     def test_slice_maps(self):
         slices = nearmiss.SliceMap(room(), pixel=0.05)

@@ -58,7 +58,7 @@ def contact(
         if answer.witness is not None:
             axes.scatter(*answer.witness, color="red", s=40)
             axes.set_title("touching")
-    else:
+    elif answer.point_a is not None and answer.point_b is not None:
         axes.plot(*np.transpose([answer.point_a, answer.point_b]), color="red", marker=".")
         axes.set_title(f"{answer.lower:.4g} to {answer.upper:.4g} apart")
     axes.set_aspect("equal")
