@@ -14,6 +14,7 @@ pub(crate) mod depths;
 pub(crate) mod descent;
 pub(crate) mod distance;
 pub(crate) mod elements;
+pub(crate) mod ends;
 pub(crate) mod extents;
 pub(crate) mod gather;
 pub(crate) mod hint;

@@ -43,6 +43,12 @@ impl PointCode {
         PointKind::from_code(self.0 & ((1 << KIND_BITS) - 1))
     }
 
+    /// Returns `true` if [`BORDER_GAP`] adjacent sectors or more are empty.
+    #[inline]
+    pub(crate) const fn is_at_border(self) -> bool {
+        self.0 >> KIND_BITS >= LAST_BORDER
+    }
+
     /// Returns `true` if all these points sample sheets.
     #[inline(always)]
     pub(crate) fn are_sheets(codes: &[Self]) -> bool {

@@ -291,6 +291,17 @@ impl PointHierarchy {
         self.arrays.codes[i].kind()
     }
 
+    /// Returns `true` if the `i`-th stored point is at a border of its sheet: a sector of its tangent
+    /// plane of about 135° or more is empty.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn is_at_border(&self, i: usize) -> bool {
+        self.arrays.codes[i].is_at_border()
+    }
+
     /// Returns the share of points that sample a sheet.
     #[must_use]
     pub fn usable(&self) -> f64 {

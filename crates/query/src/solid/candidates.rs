@@ -5,9 +5,10 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::LeafBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::wide::{Bits, bits, seen_from, squared};
+use nearmiss_lanes::wide::{Bits, along, bits, seen_from, squared};
 
 const WIDTH: usize = LeafBlock::WIDTH;
 
@@ -37,6 +38,12 @@ pub(crate) struct CandidateBlock {
     behind: u32,
     /// The lanes whose place is known.
     placed: u32,
+    /// The lanes whose place is known although they are still ranked by their depth.
+    settled: u32,
+    /// The lanes of points at borders of sheets that have not been looked at.
+    borders: u32,
+    /// The lanes of the points near a slab.
+    slab: u32,
 }
 
 /// The lanes of the candidates of a block, as bits.
@@ -46,6 +53,19 @@ pub(crate) struct CandidateLanes {
     pub(crate) missed: u32,
     pub(crate) turned: u32,
     pub(crate) behind: u32,
+    pub(crate) borders: u32,
+}
+
+/// The points near a slab.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slab {
+    /// A place of the slab.
+    pub(crate) at: [f32; 3],
+    pub(crate) normal: [f32; 3],
+    /// The greatest distance from the slab.
+    pub(crate) within: f32,
+    /// The place from whose foot distances are measured.
+    pub(crate) inside: [f32; 3],
 }
 
 /// A candidate: its block and its lane.
@@ -75,7 +95,7 @@ impl CandidateBlock {
         centres: [[f32; WIDTH]; 3],
         [most, apart]: [f32x16<S>; 2],
     ) -> Self {
-        let CandidateLanes { found, missed, turned, behind } = lanes;
+        let CandidateLanes { found, missed, turned, behind, borders } = lanes;
         Self {
             centres,
             most: most.to_array(),
@@ -88,6 +108,9 @@ impl CandidateBlock {
             turned,
             behind,
             placed: 0,
+            settled: 0,
+            borders,
+            slab: 0,
         }
     }
 
@@ -149,10 +172,30 @@ impl CandidateBlocks {
         self.0[n as usize / WIDTH].most[n as usize % WIDTH] = most;
     }
 
-    /// The number of the candidate's place, if that is known.
-    pub(crate) fn place(&self, candidate: Candidate) -> Option<usize> {
-        let (block, lane) = self.at(candidate);
+    /// The number of the candidate's place, if that is known. The depth no longer ranks it then.
+    pub(crate) fn place(&mut self, Candidate(n): Candidate) -> Option<usize> {
+        let (block, lane) = (&mut self.0[n as usize / WIDTH], n as usize % WIDTH);
+        block.placed |= block.settled & 1 << lane;
         (block.placed >> lane & 1 == 1).then(|| block.places[lane] as usize)
+    }
+
+    /// Sets the number of the place of a candidate before or behind the surface, or of a point that the
+    /// shape is beside. Its depth ranks it.
+    pub(crate) fn settle(&mut self, candidate: Candidate, number: usize, depth: f64) {
+        let Candidate(n) = candidate;
+        let (block, lane) = (&mut self.0[n as usize / WIDTH], n as usize % WIDTH);
+        block.settled |= 1 << lane;
+        block.places[lane] = id32(number);
+        block.lanes |= 1 << lane;
+        block.missed &= !(1 << lane);
+        block.behind &= !(1 << lane);
+        self.set_most(candidate, depth);
+    }
+
+    /// Returns `true` if the place is known although the candidate is still ranked by its depth.
+    pub(crate) fn is_settled(&self, candidate: Candidate) -> bool {
+        let (block, lane) = self.at(candidate);
+        block.settled >> lane & 1 == 1
     }
 
     pub(crate) fn set_place(&mut self, Candidate(n): Candidate, number: usize) {
@@ -250,6 +293,44 @@ impl CandidateBlocks {
         }
     }
 
+    /// The first point at a border of a sheet that was not near the plane of a [`Self::mark_slab`].
+    pub(crate) fn first_border(&self) -> Option<Candidate> {
+        self.lanes(|block| block.borders).min_by_key(|&candidate| self.point(candidate))
+    }
+
+    /// Finds the points near a slab. Returns the greatest bound of their depths, and the least square of
+    /// their distances along the slab. O(n).
+    pub(crate) fn mark_slab(&mut self, level: Level, slab: &Slab) -> [f32; 2] {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.mark_slab_by(simd, slab),
+        ))
+    }
+
+    #[inline(always)]
+    fn mark_slab_by<S: Simd>(&mut self, simd: S, slab: &Slab) -> [f32; 2] {
+        let none = f32x16::splat(simd, f32::NEG_INFINITY);
+        let (mut most, mut nearness) = (none, none);
+        for block in &mut self.0 {
+            let height = along(seen_from(simd, &block.centres, slab.at), slab.normal);
+            let is_level: mask32x16<S> = height.abs().simd_le(slab.within);
+            let lanes = bits(is_level);
+            block.slab = lanes & (block.lanes | block.missed);
+            block.borders &= !lanes;
+            let away = seen_from(simd, &block.centres, slab.inside);
+            let up = along(away, slab.normal);
+            nearness = nearness.max(among(simd, up * up - squared(away), block.slab));
+            let depths = f32x16::load_array_ref(simd, &block.most);
+            most = most.max(among(simd, depths, block.slab & block.lanes));
+        }
+        [most.reduce_max(), -nearness.reduce_max()]
+    }
+
+    /// The points near the plane of the last [`Self::mark_slab`].
+    pub(crate) fn in_slab(&self) -> impl Iterator<Item = Candidate> {
+        self.lanes(|block| block.slab)
+    }
+
     /// The candidate whose centre is nearest to `at`, except some points. O(n).
     pub(crate) fn nearest(&self, level: Level, at: [f32; 3], except: &[u32]) -> Option<(f32, Candidate)> {
         dispatch!(level, simd => simd.vectorize(
@@ -287,6 +368,12 @@ impl CandidateBlocks {
     }
 }
 
+/// A vector in the precision of candidates.
+#[expect(clippy::cast_possible_truncation, reason = "as precise as the positions")]
+pub(crate) fn single(v: &Vector3<f64>) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}
+
 /// The numbers in `lanes`, and negative infinity in the others.
 #[inline(always)]
 fn among<S: Simd>(simd: S, numbers: f32x16<S>, lanes: u32) -> f32x16<S> {
@@ -319,6 +406,7 @@ mod tests {
                     found: rng.random_range(0..1 << WIDTH),
                     missed: 0,
                     turned: 0,
+                    borders: 0,
                     behind: rng.random_range(0..1 << WIDTH),
                 };
                 // Many are equal.

@@ -17,10 +17,11 @@ use nearmiss_lanes::id32;
 use crate::ask::options::Detail;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
-use crate::solid::candidates::{Candidate, CandidateBlocks, Rank};
+use crate::solid::candidates::{Candidate, CandidateBlocks, Rank, single};
 use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
+use crate::solid::ends::SheetEnds;
 use crate::solid::gather::{Gather, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
 use crate::solid::place::{Place, most_depth, place_at, place_beside};
@@ -48,6 +49,7 @@ pub(crate) struct Candidates {
     found: CandidateBlocks,
     places: Vec<Met>,
     order: BinaryHeap<(u64, Candidate)>,
+    ends: SheetEnds,
 }
 
 /// A contact, where it is in the stored frame, and the index and the local radius of its point.
@@ -57,6 +59,8 @@ struct Met {
     at: Vector,
     i: usize,
     band: f64,
+    /// `true` if the shape moves out past the end of the sheet.
+    is_past_end: bool,
 }
 
 /// The selection of contacts among candidates.
@@ -83,12 +87,12 @@ pub(crate) fn contacts(
     (level, scratch, candidates): (Level, &mut ViewScratch, &mut Candidates),
 ) {
     out.clear();
-    let (mut points, mut bands) = ([0; MOST], [0.0; MOST]);
+    let (mut points, mut bands, mut at_ends) = ([0; MOST], [0.0; MOST], [false; MOST]);
     if let Some(solid) = solid {
         let own = hint.as_deref().and_then(|hint| hint.centre);
         let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
         let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
-        let Candidates { found, places, order } = candidates;
+        let Candidates { found, places, order, ends } = candidates;
         found.clear();
         places.clear();
         if !is_far(elements, solid) {
@@ -98,6 +102,10 @@ pub(crate) fn contacts(
             let search = &mut Gather { near, sides: &sides, found: &mut *found };
             // The visitor never breaks.
             let _whole = near.descend(level, &starts, search);
+        }
+        for &(candidate, i, place) in ends.places(elements, solid, level, (found, scratch)) {
+            found.settle(candidate, places.len(), place.depth);
+            places.push(Met { is_past_end: true, ..Met::new(elements, i, &place) });
         }
         let mut selection = Selection {
             elements,
@@ -112,12 +120,13 @@ pub(crate) fn contacts(
         };
         selection.run(hint.as_deref());
         for (n, met) in selection.taken.iter().flatten().enumerate() {
-            (points[n], bands[n]) = (met.i, met.band);
+            (points[n], bands[n], at_ends[n]) = (met.i, met.band, met.is_past_end);
             out.push(met.contact);
         }
         if elements.detail == Detail::Witness && elements.placed.verifies() {
             for (n, (contact, i)) in out.iter_mut().zip(points).enumerate() {
-                if elements.is_disc(i) && elements.placed.scan().kind(i) != PointKind::Edge {
+                let is_within = elements.placed.scan().kind(i) != PointKind::Edge && !at_ends[n];
+                if elements.is_disc(i) && is_within {
                     let slides = if n == 0 { SLIDES } else { 0 };
                     refine(elements, (solid, &sides.inside), (i, slides), contact, scratch);
                 }
@@ -199,9 +208,10 @@ impl Selection<'_, '_> {
                     break;
                 }
                 let i = self.found.point(candidate);
+                let is_settled = self.found.is_settled(candidate);
                 let most = most_depth(self.elements, self.solid, i, self.found.sign(candidate));
                 // It is not deeper than what is found later, either.
-                if contact.depth / scale >= most {
+                if !is_settled && contact.depth / scale >= most {
                     self.found.set_most(candidate, most);
                     continue;
                 }
@@ -236,7 +246,7 @@ impl Selection<'_, '_> {
             return;
         }
         let at = self.elements.placed.stored_to_world().apply_inverse(known.point);
-        let at = single(at.into());
+        let at = single(&at.into());
         let mut tried = [u32::MAX; TRIES];
         for attempt in 0..TRIES {
             let own = if attempt == 0 { self.found.of_point(point) } else { None };
@@ -285,13 +295,8 @@ impl Selection<'_, '_> {
         let met = self.places[own];
         self.taken[self.count] = Some(met);
         self.count += 1;
-        self.found.separate(self.level, single(met.at), met.i);
+        self.found.separate(self.level, single(&met.at), met.i);
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "as precise as the positions")]
-fn single(at: Vector) -> [f32; 3] {
-    [at.x as f32, at.y as f32, at.z as f32]
 }
 
 impl Met {
@@ -302,7 +307,7 @@ impl Met {
             depth: place.depth * elements.scale(),
             id: u64::from(elements.placed.scan().id(i).0),
         };
-        Self { contact, at: place.point, i, band: elements.band(i) }
+        Self { contact, at: place.point, i, band: elements.band(i), is_past_end: false }
     }
 
     /// Compares the depths; of equal ones the first point is deeper.
@@ -365,7 +370,7 @@ mod tests {
         let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
         let r = scan.sampling_radius();
         let rng = &mut rng(77);
-        let mut full = 0;
+        let (mut full, mut past) = (0, 0);
         for round in 0..1200 {
             let options = CollideOptions::estimated().with_detail(Detail::Verdict);
             let options = options.with_margin([0.0, 0.3 * r][round % 2]);
@@ -391,7 +396,13 @@ mod tests {
             let (mut out, mut candidates) = (Vec::new(), Candidates::default());
             let working = (Level::new(), &mut ViewScratch::default(), &mut candidates);
             contacts(&elements, Some(&solid), None, &mut out, working);
-            let [front, behind] = all_places(&elements, &solid);
+            let [mut front, mut behind] = all_places(&elements, &solid);
+            for met in candidates.places.iter().filter(|met| met.is_past_end) {
+                front.retain(|other| other.i != met.i);
+                behind.retain(|other| other.i != met.i);
+                front.push(*met);
+                past += 1;
+            }
             // Leaves are searched for discs without their thickness at the rim, so others may be missed.
             let is_near = |met: &&Met| {
                 let gap = elements.element(met.i).gap(&solid, elements.margin).0;
@@ -434,6 +445,7 @@ mod tests {
             }
             full += usize::from(out.len() == MOST);
         }
+        assert!(past > 100, "{past} places past ends of {name}");
         full
     }
 }

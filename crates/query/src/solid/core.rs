@@ -208,6 +208,16 @@ impl<'a> Solid<'a> {
         matches!(self.core, Core::Point | Core::Segment)
     }
 
+    /// The radius of a ball about [`Self::inside`] that is within the shape: a lower bound of the greatest.
+    pub(crate) fn inner_radius(&self) -> f64 {
+        let of_core = match self.core {
+            Core::Box => self.half.min(),
+            Core::Round([below, above]) if below == above => self.half.min(),
+            _ => 0.0,
+        };
+        self.radius + of_core
+    }
+
     fn ends(&self) -> [Vector; 2] {
         let along = self.axes[0] * self.half.x;
         [self.centre - along, self.centre + along]

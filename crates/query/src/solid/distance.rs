@@ -173,7 +173,7 @@ impl PlaceVisitor for Apart<'_, '_> {
         }
         for (block, first, count) in elements.arrays.leaves.blocks(number) {
             let gaps = elements.leaf_gaps(simd, &self.near.lane_box, (number, block, first, count));
-            let mut left = Elements::within(simd, (&gaps.elements, count), self.near.most);
+            let mut left = Elements::lanes_within(simd, (&gaps.elements, count), self.near.most);
             while left != 0 {
                 let mut lane = left.trailing_zeros() as usize;
                 for other in Bits(left) {
@@ -189,7 +189,7 @@ impl PlaceVisitor for Apart<'_, '_> {
             }
             if elements.certifies && elements.semantics == Semantics::Obstacle {
                 let upper = self.lower.min(self.upper);
-                for lane in Bits(Elements::within(simd, (&gaps.cells, count), self.near.most)) {
+                for lane in Bits(Elements::lanes_within(simd, (&gaps.cells, count), self.near.most)) {
                     let by_lanes = self.near.gap_of_shape(gaps.cells[lane]).max(node_gap);
                     if by_lanes < upper.min(self.lower) {
                         self.bound(first + lane, by_lanes);

@@ -166,6 +166,11 @@ impl<'a> Elements<'a> {
         Self { detail: Detail::Verdict, ..*self }
     }
 
+    /// The same with another margin, in the stored frame.
+    pub(crate) fn within(&self, margin: f64) -> Self {
+        Self { margin, ..*self }
+    }
+
     /// The same with flat cells, as rays see them. Lower bounds on distances are then those from the discs,
     /// the balls and the flat cells, unless only enclosures count.
     pub(crate) fn flat(&self) -> Self {
@@ -225,10 +230,15 @@ impl<'a> Elements<'a> {
         f32x16::load_array_ref(simd, &radii)
     }
 
-    /// The lanes among `lanes`, from the point `first` on, whose points are at an edge, as bits.
-    pub(crate) fn edges(&self, first: usize, lanes: u32) -> u32 {
-        let is_edge = |lane: usize| self.placed.scan().kind(first + lane) == PointKind::Edge;
-        Bits(lanes).fold(0, |edges, lane| edges | u32::from(is_edge(lane)) << lane)
+    /// Returns `true` if a point is at a border of a sheet.
+    pub(crate) fn is_at_border(&self, i: usize) -> bool {
+        self.placed.scan().is_at_border(i) || self.placed.scan().kind(i) == PointKind::Edge
+    }
+
+    /// The lanes among `lanes`, from the point `first` on, whose points are at a border, as bits.
+    pub(crate) fn borders(&self, first: usize, lanes: u32) -> u32 {
+        let is_at_border = |lane: usize| self.is_at_border(first + lane);
+        Bits(lanes).fold(0, |borders, lane| borders | u32::from(is_at_border(lane)) << lane)
     }
 
     pub(crate) fn normal(&self, i: usize) -> Vector {
@@ -424,7 +434,7 @@ impl<'a> Elements<'a> {
 
     /// The first `count` lanes that are not further than `most`.
     #[inline(always)]
-    pub(crate) fn within<S: Simd>(simd: S, (gaps, count): (&[f32; WIDTH], usize), most: f32) -> u32 {
+    pub(crate) fn lanes_within<S: Simd>(simd: S, (gaps, count): (&[f32; WIDTH], usize), most: f32) -> u32 {
         // Not `<=`, which would be false for NaN.
         let beyond: mask32x16<S> = f32x16::load_array_ref(simd, gaps).simd_gt(most);
         !bits(beyond) & ((1 << count) - 1)

@@ -66,7 +66,7 @@ impl Gather<'_, '_> {
         let parts = elements.parts(simd, leaf, part, false);
         let Measured { distances, tilt, .. } = Measured::new(simd, &lane_box, block);
         let gaps = distances.parts(simd, parts.radii, parts.radii * THICKNESS, parts.discs) - tilt;
-        let lanes = Elements::within(simd, (&gaps.to_array(), count), most);
+        let lanes = Elements::lanes_within(simd, (&gaps.to_array(), count), most);
         if lanes == 0 {
             return;
         }
@@ -98,16 +98,16 @@ impl Gather<'_, '_> {
         let is_in: mask32x16<S> = distances.from_point.simd_le(tilt);
         let of_balls = is_in.select(none, parts.radii + radius - distances.from_point + tilt);
         let depths = parts.discs.select(of_discs, of_balls);
-        let edges = elements.edges(first, turned.lanes);
-        let is_edge = mask32x16::from_bitmask(simd, u64::from(edges));
+        let borders = elements.borders(first, turned.lanes & bits(parts.discs));
+        let is_border = mask32x16::from_bitmask(simd, u64::from(borders));
         // Beside a border, the depth is along the way to the border.
-        let depths = is_edge.select(depths.max(radius - gaps), depths);
+        let depths = is_border.select(depths.max(radius - gaps), depths);
         #[expect(clippy::cast_possible_truncation, reason = "depths are rounded more")]
         let least = (parts.radii * -THICKNESS).min(-elements.margin as f32);
         let is_missed: mask32x16<S> = depths.simd_lt(least);
         let missed = turned.lanes & bits(is_missed);
         let Turned { lanes, turned, behind, .. } = turned;
-        let lanes = CandidateLanes { found: lanes & !missed, missed, turned, behind };
+        let lanes = CandidateLanes { found: lanes & !missed, missed, turned, behind, borders };
         let apart = elements.local_radii(simd, first, count) * SPREAD;
         let centres = elements.positions(first, count);
         self.found.push(CandidateBlock::new(first, lanes, centres, [depths, apart]));

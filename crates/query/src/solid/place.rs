@@ -12,7 +12,7 @@ use crate::solid::portal::Lowest;
 type Vector = Vector3<f64>;
 
 /// The precision of a distance, in disc radii.
-const PRECISION: f64 = 1e-3;
+pub(crate) const PRECISION: f64 = 1e-3;
 
 /// A place where a shape touches the surface.
 #[derive(Debug, Clone, Copy)]
@@ -130,7 +130,7 @@ fn near_gap(elements: &Elements<'_>, solid: &Solid<'_>, i: usize) -> Option<Gap>
 }
 
 /// The nearest points of a core and a disc, if these are within `most`.
-fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<Gap> {
+pub(crate) fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<Gap> {
     Some(solid.gap(disc, most)).filter(|gap| gap.distance <= most)
 }
 

@@ -233,11 +233,11 @@ impl PlaceVisitor for Touch<'_, '_> {
         for (block, first, count) in elements.arrays.leaves.blocks(number) {
             let gaps = elements.leaf_gaps(simd, lane_box, (number, block, first, count));
             if solid.is_closed_in_lanes() {
-                let first_in = Bits(Elements::within(simd, (&gaps.points, count), most)).next();
+                let first_in = Bits(Elements::lanes_within(simd, (&gaps.points, count), most)).next();
                 first_in
                     .map_or(ControlFlow::Continue(()), |lane| found.hold(elements, solid, first + lane))?;
             }
-            for lane in Bits(Elements::within(simd, (&gaps.elements, count), most)) {
+            for lane in Bits(Elements::lanes_within(simd, (&gaps.elements, count), most)) {
                 found.compare(elements, solid, first + lane)?;
             }
             if elements.certifies
@@ -246,7 +246,7 @@ impl PlaceVisitor for Touch<'_, '_> {
                 && found.count == 0
             {
                 let within = elements.margin + solid.radius;
-                for lane in Bits(Elements::within(simd, (&gaps.cells, count), most)) {
+                for lane in Bits(Elements::lanes_within(simd, (&gaps.cells, count), most)) {
                     found.doubtful = !elements.is_cell_beyond(solid, first + lane, within);
                     if found.doubtful {
                         break;

@@ -32,6 +32,7 @@ mod shape_mesh_penetration;
 mod shape_pairs;
 mod shape_worlds;
 mod shapes;
+mod sheet_ends;
 mod sides;
 mod solid_contacts;
 mod solid_sweeps;

@@ -1,0 +1,225 @@
+//! Contacts at the ends of sheets: shapes beside and across the border of a plate.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_query::{CollideOptions, Placed, Scratch, Shape, ShapeContact, ShapePlan, Target};
+use nearmiss_testdata::arbitrary::{rng, rotation};
+use rand::RngExt;
+
+type Vector = Vector3<f64>;
+
+const SPACING: f64 = 0.05;
+
+/// A plate in the plane of x and y that ends at x = 0. Its points are off a lattice by up to this share of the
+/// spacing in each direction, and by a tenth of that across the plate.
+fn plate(jitter: f64) -> PointHierarchy {
+    let rng = &mut rng(11);
+    let mut points = Vec::new();
+    for i in 0..40 {
+        for j in -30..=30 {
+            let lattice = [-f64::from(i), f64::from(j), 0.0];
+            let off = [0.5, 0.5, 0.05].map(|share| share * jitter * rng.random_range(-1.0..=1.0));
+            points.push([0, 1, 2].map(|k| (lattice[k] + off[k]) * SPACING));
+        }
+    }
+    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+/// The number of forms of shapes.
+const FORMS: usize = 5;
+
+/// A shape of random size about `centre`, and its support map.
+fn shape(
+    rng: &mut impl RngExt,
+    form: usize,
+    centre: [f64; 3],
+) -> (Shape<'static>, Box<dyn Fn(Vector) -> Vector>) {
+    let pose = rotation(rng).with_translation(centre);
+    let size = |rng: &mut dyn FnMut() -> f64| 0.05 + 0.35 * rng();
+    let mut draw = || rng.random_range(0.0..1.0_f64);
+    let [a, b, c] = [size(&mut draw), size(&mut draw), size(&mut draw)];
+    let middle = Vector::from(centre);
+    let own = move |d: Vector| Vector::from(pose.rotate_inverse(d.into()));
+    let world = move |p: Vector| Vector::from(pose.apply(p.into()));
+    match form {
+        0 => (Shape::Sphere { centre, radius: a }, Box::new(move |d| middle + d.normalize() * a)),
+        1 => {
+            let ends = [[0.0, b, 0.0], [0.0, -b, 0.0]].map(|p| pose.apply(p));
+            let support = move |d: Vector| {
+                let [p, q] = ends.map(Vector::from);
+                (if d.dot(&(p - q)) > 0.0 { p } else { q }) + d.normalize() * a
+            };
+            (Shape::Capsule { ends, radius: a }, Box::new(support))
+        }
+        2 => {
+            let half = [a, b, c];
+            let support = move |d: Vector| {
+                let d = own(d);
+                world(Vector::from_fn(|k, _| half[k].copysign(d[k])))
+            };
+            (Shape::Box { pose, half, radius: 0.0 }, Box::new(support))
+        }
+        3 => {
+            let support = move |d: Vector| {
+                let d = own(d);
+                let across = Vector::new(d.x, 0.0, d.z);
+                let out = across.try_normalize(1e-12).unwrap_or_else(Vector::zeros) * a;
+                world(out + Vector::new(0.0, b.copysign(d.y), 0.0))
+            };
+            (Shape::Cylinder { pose, half_height: b, radius: a, rounding: 0.0 }, Box::new(support))
+        }
+        _ => {
+            let points: Vec<[f64; 3]> = (0..12)
+                .map(|_| {
+                    pose.apply([a * (2.0 * draw() - 1.0), b * (2.0 * draw() - 1.0), c * (2.0 * draw() - 1.0)])
+                })
+                .collect();
+            let points: &'static [[f64; 3]] = points.leak();
+            let support = move |d: Vector| {
+                let all = points.iter().map(|p| Vector::from(*p));
+                all.max_by(|p, q| p.dot(&d).total_cmp(&q.dot(&d))).unwrap()
+            };
+            (Shape::Hull { points, radius: 0.0 }, Box::new(support))
+        }
+    }
+}
+
+/// The least shift along any way out that the half plane leaves, and the sine of its angle to the plate.
+fn shortest(support: &dyn Fn(Vector) -> Vector, shift: Vector) -> (f64, f64) {
+    let ways = (0..=720).map(|k| {
+        let (sin, cos) = (PI * f64::from(k) / 720.0 - FRAC_PI_2).sin_cos();
+        let way = Vector::new(cos, 0.0, sin);
+        (-(support(-way) + shift).dot(&way), sin)
+    });
+    ways.min_by(|a, b| a.0.total_cmp(&b.0)).expect("some ways")
+}
+
+/// A shape at the border is apart once it has moved along its deepest contact, which is not much deeper than
+/// the shortest way out is long. The discs at the border reach a little beyond the outermost points.
+#[test]
+fn shapes_move_out_past_the_border_of_a_plate() {
+    for (jitter, overhang) in [(0.0, 0.5), (0.4, 0.7), (1.0, 1.0)] {
+        let scan = plate(jitter);
+        let r = scan.sampling_radius();
+        let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+        let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+        let (rng, mut contacts, mut scratch) = (&mut rng(5), Vec::new(), Scratch::default());
+        for form in 0..FORMS {
+            let (mut cases, mut aside, mut left, mut longer) = (0, 0, 0, 0);
+            for _ in 0..1000 {
+                let centre =
+                    [rng.random_range(-0.1..0.5), rng.random_range(-0.5..0.5), rng.random_range(-0.4..0.4)];
+                let (shape, support) = shape(rng, form, centre);
+                let (length, sine) = shortest(&support, Vector::zeros());
+                if length < 0.3 * r {
+                    continue;
+                }
+                cases += 1;
+                aside += usize::from(sine.abs() < 0.9);
+                target.contacts(&shape, &mut contacts, &mut scratch);
+                let first = contacts.first().unwrap_or_else(|| panic!("no contact of {shape:?}"));
+                let moved = Vector::from(first.normal) * first.depth;
+                left += usize::from(shortest(&support, moved).0 > 0.3 * r);
+                longer += usize::from(first.depth > length + overhang * r);
+            }
+            let told = format!("jitter {jitter}, form {form}: {cases} {aside} {left} {longer}");
+            println!("{told}");
+            assert!(aside > 80 && left * 50 <= cases && longer * 20 <= cases, "{told}");
+        }
+    }
+}
+
+/// A floor at z = 0 and a table top above it that ends at x = 0.
+fn room() -> PointHierarchy {
+    let steps = || (-40..=40).map(|k| SPACING * f64::from(k));
+    let points: Vec<[f64; 3]> = steps()
+        .flat_map(|x| steps().flat_map(move |y| [[x, y, 0.0], [x, y, 0.7]]))
+        .filter(|p| p[2] == 0.0 || p[0] <= 0.0)
+        .collect();
+    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+/// Bodies that stand on the floor are pushed away from the table, not onto it.
+#[test]
+fn a_body_beside_a_table_is_pushed_sideways() {
+    let unoriented = room();
+    let mut oriented = unoriented.clone();
+    oriented.turn_normals(&vec![[0.0, 0.0, 1.0]; oriented.len()]);
+    push_sideways(&unoriented);
+    push_sideways(&oriented);
+}
+
+fn push_sideways(scan: &PointHierarchy) {
+    let r = scan.sampling_radius();
+    let plan = ShapePlan::new(&CollideOptions::default(), scan).unwrap();
+    let target = Target::new(Placed::new(scan, &Pose::IDENTITY), &plan);
+    let (mut contacts, mut scratch) = (Vec::new(), Scratch::default());
+    for overlap in [0.02, 0.06, 0.15] {
+        for y in [0.0, 0.013, 0.38] {
+            let x = 0.3 - overlap;
+            let stands = Pose::from_axis_angle([1.0, 0.0, 0.0], FRAC_PI_2).with_translation([x, y, 0.799]);
+            let turned = Pose::IDENTITY.with_translation([x, y, 0.799]);
+            let bodies = [
+                Shape::Capsule { ends: [[x, y, 0.299], [x, y, 1.3]], radius: 0.3 },
+                Shape::Cylinder { pose: stands, half_height: 0.8, radius: 0.3, rounding: 0.0 },
+                Shape::Box { pose: turned, half: [0.3, 0.4, 0.8], radius: 0.0 },
+            ];
+            for body in bodies {
+                target.contacts(&body, &mut contacts, &mut scratch);
+                let (table, floor): (Vec<&ShapeContact>, Vec<&ShapeContact>) =
+                    contacts.iter().partition(|it| it.point[2] > 0.5);
+                assert!(!table.is_empty() && !floor.is_empty(), "{body:?}: {contacts:?}");
+                for contact in &floor {
+                    let is_up = contact.normal[2] > 0.999 && (-1e-3..0.001 + 1e-6).contains(&contact.depth);
+                    assert!(is_up, "{body:?}: {contact:?}");
+                }
+                let deepest = table.iter().max_by(|a, b| a.depth.total_cmp(&b.depth)).unwrap();
+                // The rims of the discs are beyond the outermost points.
+                let beyond = deepest.depth - overlap;
+                assert!(
+                    deepest.normal[0] > 0.99 && (0.0..0.5 * r).contains(&beyond),
+                    "{body:?}: {contacts:?}"
+                );
+                for contact in &table {
+                    let is_level = contact.normal[2].abs() < 0.02 && contact.normal[0] > 0.3;
+                    assert!(is_level, "{body:?}: {contact:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Bodies that rest on a plate and reach beyond its border are held by it.
+#[test]
+fn a_body_on_the_border_of_a_plate_is_pushed_up() {
+    for jitter in [0.0, 0.4, 1.0] {
+        let scan = plate(jitter);
+        let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+        let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+        let (rng, mut contacts, mut scratch) = (&mut rng(9), Vec::new(), Scratch::default());
+        for round in 0..300 {
+            let (x, y) = (rng.random_range(-0.3..0.0), rng.random_range(-0.5..0.5));
+            let (depth, turn) = (rng.random_range(0.002..0.01), rng.random_range(0.0..PI));
+            let upright = |turn: f64| Pose::from_axis_angle([0.0, 0.0, 1.0], turn);
+            let lies = upright(turn).with_translation([x, y, 0.2 - depth]);
+            let (sin, cos) = turn.sin_cos();
+            let ends = [-0.3, 0.3].map(|t| [x + t * cos, y + t * sin, 0.2 - depth]);
+            let body = match round % 3 {
+                0 => Shape::Box { pose: lies, half: [0.3, 0.2, 0.2], radius: 0.0 },
+                1 => Shape::Capsule { ends, radius: 0.2 },
+                _ => Shape::Sphere { centre: ends[0], radius: 0.2 },
+            };
+            target.contacts(&body, &mut contacts, &mut scratch);
+            if round % 3 == 2 && ends[0][0] > 0.0 {
+                continue;
+            }
+            let first = contacts.first().unwrap_or_else(|| panic!("no contact of {body:?}"));
+            let rough = 0.001 + 0.01 * jitter;
+            assert!(first.normal[2] > 0.98, "jitter {jitter}: {body:?} {contacts:?}");
+            assert!((first.depth - depth).abs() < rough, "jitter {jitter}: {body:?} {contacts:?}");
+        }
+    }
+}
