@@ -107,6 +107,7 @@ pub struct CleanMesh {
     vertices: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
     sources: Vec<u32>,
+    seams: Vec<[u32; 3]>,
     report: CleanReport,
 }
 
@@ -148,9 +149,11 @@ impl CleanMesh {
         let proper = |t: &[u32; 3]| {
             t[0] != t[1] && t[1] != t[2] && t[2] != t[0] && has_area(&t.map(|v| vertices[v as usize]))
         };
-        let mut remaining: Vec<(u32, [u32; 3])> = (0..).zip(welded).filter(|(_, t)| proper(t)).collect();
-        let degenerate_triangles = triangles.len() - remaining.len();
-        let duplicate_triangles = drop_duplicates(&mut remaining);
+        let (mut remaining, mut seams): (Vec<(u32, [u32; 3])>, Vec<(u32, [u32; 3])>) =
+            (0..).zip(welded).partition(|(_, t)| proper(t));
+        let degenerate_triangles = seams.len();
+        seams.retain(|(_, t)| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
+        let duplicate_triangles = drop_duplicates(&mut remaining, &mut seams);
 
         let mut used = vec![false; vertices.len()];
         for &v in remaining.iter().flat_map(|(_, t)| t) {
@@ -177,6 +180,11 @@ impl CleanMesh {
             vertices: left,
             triangles: remaining.iter().map(|(_, t)| t.map(|v| numbers[v as usize])).collect(),
             sources: remaining.iter().map(|(source, _)| *source).collect(),
+            seams: seams
+                .iter()
+                .filter(|(_, t)| t.iter().all(|&v| used[v as usize]))
+                .map(|(_, t)| t.map(|v| numbers[v as usize]))
+                .collect(),
             report,
         })
     }
@@ -197,6 +205,14 @@ impl CleanMesh {
     #[must_use]
     pub fn sources(&self) -> &[u32] {
         &self.sources
+    }
+
+    /// Vertex indices of triangles that were dropped but may connect others: those without area between
+    /// three vertices, and one for each triangle that occurs equally often in both orientations, such as
+    /// the common wall of two boxes. With their edges, a mesh that was closed before is closed.
+    #[must_use]
+    pub fn seams(&self) -> &[[u32; 3]] {
+        &self.seams
     }
 
     /// The corners of the `i`-th triangle.
@@ -244,17 +260,26 @@ pub fn validate(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(), Cle
     Ok(())
 }
 
-/// Keeps the first of the triangles with the same corners, and returns the number of others.
-fn drop_duplicates(triangles: &mut Vec<(u32, [u32; 3])>) -> usize {
+/// Keeps the first of the triangles with the same corners, and returns the number of others. One of those that
+/// occur equally often in both orientations is added to `seams`.
+fn drop_duplicates(triangles: &mut Vec<(u32, [u32; 3])>, seams: &mut Vec<(u32, [u32; 3])>) -> usize {
     let before = triangles.len();
-    let sorted = |&(source, mut corners): &(u32, [u32; 3])| {
-        corners.sort_unstable();
-        (corners, source)
+    let sorted = |&(source, corners): &(u32, [u32; 3])| {
+        let mut ordered = corners;
+        ordered.sort_unstable();
+        let least = corners.iter().position(|&v| v == ordered[0]).unwrap_or(0);
+        (ordered, source, corners[(least + 1) % 3] == ordered[1])
     };
-    let mut keys: Vec<([u32; 3], u32)> = triangles.iter().map(sorted).collect();
+    let mut keys: Vec<([u32; 3], u32, bool)> = triangles.iter().map(sorted).collect();
     keys.sort_unstable();
-    keys.dedup_by_key(|(corners, _)| *corners);
-    let mut firsts: Vec<u32> = keys.into_iter().map(|(_, source)| source).collect();
+    let mut firsts = Vec::with_capacity(keys.len());
+    for same in keys.chunk_by(|a, b| a.0 == b.0) {
+        let (corners, first, _) = same[0];
+        firsts.push(first);
+        if 2 * same.iter().filter(|key| key.2).count() == same.len() {
+            seams.push((first, corners));
+        }
+    }
     firsts.sort_unstable();
     let mut firsts = firsts.into_iter().peekable();
     triangles.retain(|(source, _)| firsts.next_if_eq(source).is_some());

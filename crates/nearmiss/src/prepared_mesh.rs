@@ -12,7 +12,7 @@ use nearmiss_store::{Bytes, Check, File, LoadError, WriteError, Writer};
 
 /// Version of the layout of a mesh's sections and metadata. Raise it whenever one of them is added
 /// or changes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A triangle mesh prepared for queries. Cloning it costs a reference count. Threads can share it.
 ///

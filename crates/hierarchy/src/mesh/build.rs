@@ -98,6 +98,7 @@ impl MeshHierarchy {
         let mut hash = Xxh3::new();
         hash.update(bytemuck::cast_slice(&self.arrays.vertices));
         hash.update(bytemuck::cast_slice(&self.arrays.triangles));
+        hash.update(bytemuck::cast_slice(&self.arrays.seams));
         hash.digest()
     }
 
@@ -123,6 +124,7 @@ impl MeshHierarchy {
             vertices: &self.arrays.vertices,
             triangles: &self.arrays.triangles,
             source: &self.arrays.source,
+            seams: &self.arrays.seams,
             cells: &self.arrays.cells,
             ball: &self.meta.ball,
         }
@@ -142,6 +144,8 @@ pub struct MeshView<'a> {
     pub triangles: &'a [[u32; 3]],
     /// The index of each triangle in the caller's mesh.
     pub source: &'a [u32],
+    /// The vertex indices of dropped triangles that may connect others ([`CleanMesh::seams`]).
+    pub seams: &'a [[u32; 3]],
     /// The number of well-filled cells of each node, of [`CELLS`](crate::CELLS); empty if they were
     /// not counted.
     pub cells: &'a [u8],
@@ -172,7 +176,7 @@ fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarch
         return Err(MeshBuildError::Empty { triangles: mesh.triangles().len() });
     }
     let (items, mut built) = over(clean.vertices(), clean.triangles(), options.cells)?;
-    let (vertices, triangles) = in_order(&clean, &items);
+    let Ordered { vertices, triangles, seams } = in_order(&clean, &items);
     let source: Vec<u32> = items.iter().map(|item| clean.sources()[item.index as usize]).collect();
     let report = clean.report();
     built.meta.given = given;
@@ -184,6 +188,7 @@ fn build(mesh: &TriangleMesh, options: &MeshBuildOptions) -> Result<MeshHierarch
     built.arrays.vertices = vertices.into();
     built.arrays.triangles = triangles.into();
     built.arrays.source = source.into();
+    built.arrays.seams = seams.into();
     built.meta.identity = built.hashed();
     Ok(built)
 }
@@ -281,8 +286,14 @@ pub(crate) fn block(
     TriangleBlock::new(&triangles[..count])
 }
 
-/// Returns the vertices in the order of their first use and the triangles in leaf order.
-fn in_order(clean: &CleanMesh, items: &[Item]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+/// The vertices in the order of their first use, the triangles in leaf order, and the seams.
+struct Ordered {
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+    seams: Vec<[u32; 3]>,
+}
+
+fn in_order(clean: &CleanMesh, items: &[Item]) -> Ordered {
     let mut numbers = vec![u32::MAX; clean.vertices().len()];
     let mut vertices = Vec::with_capacity(clean.vertices().len());
     let triangles = items
@@ -298,5 +309,7 @@ fn in_order(clean: &CleanMesh, items: &[Item]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>)
             })
         })
         .collect();
-    (vertices, triangles)
+    // Every vertex of a seam is that of a triangle.
+    let seams = clean.seams().iter().map(|t| t.map(|v| numbers[v as usize])).collect();
+    Ordered { vertices, triangles, seams }
 }

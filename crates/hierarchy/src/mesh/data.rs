@@ -1,5 +1,5 @@
 //! The data of a prepared mesh: metadata, and arrays that are each a section of a file. Increase
-//! `VERSION` in `nearmiss/src/mesh.rs` with every change here.
+//! `VERSION` in `nearmiss/src/prepared_mesh.rs` with every change here.
 
 use nearmiss_geometry::{Aabb, Frame};
 use nearmiss_store::{Array, File, OpenError, WriteError, Writer};
@@ -47,6 +47,8 @@ pub(crate) struct MeshArrays {
     pub(crate) triangles: Array<[u32; 3]>,
     /// The indices of the triangles in the input.
     pub(crate) source: Array<u32>,
+    /// The vertex indices of dropped triangles that may connect others.
+    pub(crate) seams: Array<[u32; 3]>,
     /// The well-filled cells of each node; empty if they were not counted.
     pub(crate) cells: Array<u8>,
 }
@@ -59,6 +61,7 @@ impl MeshArrays {
         writer.section(*b"VERT", 0, &self.vertices)?;
         writer.section(*b"TRIS", 0, &self.triangles)?;
         writer.section(*b"SRCE", 0, &self.source)?;
+        writer.section(*b"SEAM", 0, &self.seams)?;
         writer.section(*b"CELL", 0, &self.cells)?;
         Ok(())
     }
@@ -71,6 +74,7 @@ impl MeshArrays {
             vertices: file.array(*b"VERT", 0)?,
             triangles: file.array(*b"TRIS", 0)?,
             source: file.array(*b"SRCE", 0)?,
+            seams: file.array(*b"SEAM", 0)?,
             cells: file.array(*b"CELL", 0)?,
         })
     }

@@ -12,10 +12,12 @@ use nearmiss_mesh::triangles_meet;
 /// The closed parts of a mesh, which make it a solid.
 ///
 /// A part is a set of triangles that are connected along edges. It is closed if each of its edges
-/// belongs to an even number of its triangles. The orientation of triangles does not matter. A place
-/// is inside if the closed parts enclose it an odd number of times, so a shell inside another one is
-/// a cavity. The solid consists of the places inside and of all triangles. A mesh without a closed
-/// part is its triangles only.
+/// belongs to an even number of its triangles. The orientation of triangles does not matter, except
+/// that a triangle that occurs equally often in both orientations is a wall between two cells of a
+/// solid, such as the common face of two boxes. Triangles without area connect others as in the
+/// input, although no query compares them. A place is inside if the closed parts enclose it an odd
+/// number of times, so a shell inside another one is a cavity. The solid consists of the places
+/// inside and of all triangles. A mesh without a closed part is its triangles only.
 ///
 /// Takes a byte per triangle, and does not refer to the mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,30 +35,17 @@ impl MeshSolid {
     #[must_use]
     pub fn new(mesh: &MeshHierarchy) -> Self {
         let view = mesh.arrays();
-        let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * view.triangles.len());
-        for (i, t) in view.triangles.iter().enumerate() {
-            edges.extend([0, 1, 2].map(|k| {
-                let (p, q) = (t[k], t[(k + 1) % 3]);
-                ([p.min(q), p.max(q)], id32(i))
-            }));
-        }
-        edges.sort_unstable();
-        let mut parts = Parts::new(view.triangles.len());
-        for two in edges.windows(2).filter(|two| two[0].0 == two[1].0) {
-            parts.join(two[0].1, two[1].1);
-        }
-        let mut is_closed = vec![true; view.triangles.len()];
-        for edge in edges.chunk_by(|e, f| e.0 == f.0).filter(|edge| edge.len() % 2 == 1) {
-            is_closed[parts.root(edge[0].1) as usize] = false;
-        }
-        let (mut closed, mut places) = (Vec::with_capacity(view.triangles.len()), Vec::new());
-        for (i, t) in view.triangles.iter().enumerate() {
-            let root = parts.root(id32(i));
-            closed.push(is_closed[root as usize]);
-            if root == id32(i) {
-                places.push(t[0]);
+        let Joined { mut sets, mut closed } = Joined::new(view.triangles, &[]);
+        if !view.seams.is_empty() && closed.contains(&false) {
+            let seamed = Joined::new(view.triangles, view.seams);
+            let is_wall = walls(&view);
+            for (i, is_closed) in closed.iter_mut().enumerate() {
+                *is_closed |= seamed.closed[i] && !is_wall[i];
             }
         }
+        let triangles = view.triangles.iter().enumerate();
+        let firsts = triangles.filter(|(i, _)| sets.root(id32(*i)) == id32(*i));
+        let places = firsts.map(|(_, t)| t[0]).collect();
         if !closed.contains(&true) {
             closed = Vec::new();
         }
@@ -84,6 +73,48 @@ impl MeshSolid {
         let vertices: &'v [[f64; 3]] = view.vertices;
         self.places.iter().filter_map(move |&v| vertices.get(v as usize).copied())
     }
+}
+
+/// The parts of a mesh, and for each triangle `true` if its part is closed.
+struct Joined {
+    sets: Parts,
+    closed: Vec<bool>,
+}
+
+impl Joined {
+    /// Joins triangles along edges. `seams` connect them and are no part of the answer. O(n log n).
+    fn new(triangles: &[[u32; 3]], seams: &[[u32; 3]]) -> Self {
+        let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * (triangles.len() + seams.len()));
+        for (i, t) in triangles.iter().chain(seams).enumerate() {
+            edges.extend([0, 1, 2].map(|k| {
+                let (p, q) = (t[k], t[(k + 1) % 3]);
+                ([p.min(q), p.max(q)], id32(i))
+            }));
+        }
+        edges.sort_unstable();
+        let mut sets = Parts::new(triangles.len() + seams.len());
+        for two in edges.windows(2).filter(|two| two[0].0 == two[1].0) {
+            sets.join(two[0].1, two[1].1);
+        }
+        let mut is_closed = vec![true; triangles.len() + seams.len()];
+        for edge in edges.chunk_by(|e, f| e.0 == f.0).filter(|edge| edge.len() % 2 == 1) {
+            is_closed[sets.root(edge[0].1) as usize] = false;
+        }
+        let closed = (0..id32(triangles.len())).map(|i| is_closed[sets.root(i) as usize]).collect();
+        Self { sets, closed }
+    }
+}
+
+/// For each triangle, `true` if it occurred in both orientations.
+fn walls(view: &MeshView<'_>) -> Vec<bool> {
+    let sorted = |t: &[u32; 3]| {
+        let mut corners = *t;
+        corners.sort_unstable();
+        corners
+    };
+    let mut seams: Vec<[u32; 3]> = view.seams.iter().map(sorted).collect();
+    seams.sort_unstable();
+    view.triangles.iter().map(|t| seams.binary_search(&sorted(t)).is_ok()).collect()
 }
 
 /// Sets of triangles that are joined (union–find with path halving).

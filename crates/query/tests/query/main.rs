@@ -19,6 +19,7 @@ mod margin;
 mod mesh_clashes;
 mod mesh_scan_penetration;
 mod mesh_scans;
+mod mesh_seams;
 mod mesh_sweeps;
 mod mesh_worlds;
 mod meshes;
