@@ -90,6 +90,11 @@ impl ScanWorld {
         &self.options
     }
 
+    /// The distance from the box of a scan up to which a shape may touch it.
+    pub(crate) fn reach(&self) -> f64 {
+        self.options.semantics.growth() + self.options.margin
+    }
+
     /// A body as the target of shapes and rays.
     pub(crate) fn target(&self, body: BodyId) -> Option<(Entity, Target<'_>)> {
         let Placing { entity, plan } = self.of_body.get(&body)?;

@@ -48,7 +48,7 @@ impl Scans<'_, '_> {
         let length = ray.direction.iter().map(|c| c * c).sum::<f64>().sqrt();
         let end = [0, 1, 2].map(|k| ray.origin[k] + ray.direction[k] / length * ray.max);
         let path = Shape::Capsule { ends: [ray.origin, end], radius: ray.radius };
-        self.world.bodies().near_shape(&path, 0.0, near);
+        self.world.bodies().near_shape(&path, self.world.options().semantics.growth(), near);
         let mut first: Option<(Entity, RayHit)> = None;
         for (entity, target) in near.iter().filter_map(|&body| self.world.target(body)) {
             let hit = target.cast(ray, scratch).hit;
@@ -63,7 +63,7 @@ impl Scans<'_, '_> {
     pub fn touching(&mut self, shape: &Shape<'_>, out: &mut Vec<Entity>) {
         out.clear();
         let Working { scratch, near, .. } = &mut *self.working;
-        self.world.bodies().near_shape(shape, self.world.options().margin, near);
+        self.world.bodies().near_shape(shape, self.world.reach(), near);
         for (entity, target) in near.iter().filter_map(|&body| self.world.target(body)) {
             if target.touch(shape, scratch).verdict.is_touching() {
                 out.push(entity);
@@ -76,7 +76,7 @@ impl Scans<'_, '_> {
     pub fn contacts(&mut self, shape: &Shape<'_>, out: &mut Vec<(Entity, ShapeContact)>) {
         out.clear();
         let Working { scratch, near, contacts } = &mut *self.working;
-        self.world.bodies().near_shape(shape, self.world.options().margin, near);
+        self.world.bodies().near_shape(shape, self.world.reach(), near);
         for (entity, target) in near.iter().filter_map(|&body| self.world.target(body)) {
             target.contacts(shape, contacts, scratch);
             out.extend(contacts.iter().map(|&contact| (entity, contact)));
@@ -87,7 +87,7 @@ impl Scans<'_, '_> {
     #[must_use]
     pub fn nearest(&mut self, shape: &Shape<'_>, within: f64) -> Option<(Entity, ShapeDistance)> {
         let Working { scratch, near, .. } = &mut *self.working;
-        self.world.bodies().near_shape(shape, within, near);
+        self.world.bodies().near_shape(shape, within + self.world.options().semantics.growth(), near);
         let mut best: Option<(Entity, ShapeDistance)> = None;
         for (entity, target) in near.iter().filter_map(|&body| self.world.target(body)) {
             let within = best.map_or(within, |(_, best)| best.upper);

@@ -14,7 +14,7 @@ use bevy_transform::TransformPlugin;
 use bevy_transform::components::Transform;
 use nearmiss::geometry::PointCloud;
 use nearmiss::{
-    BuildOptions, CollideOptions, CollidePlan, Pair, Pose, Scan, Scratch, Shape, ShapePlan, Target,
+    BuildOptions, CollideOptions, CollidePlan, Pair, Pose, Scan, Scratch, Semantics, Shape, ShapePlan, Target,
 };
 use nearmiss_bevy::{
     ContactPhase, ScanAsset, ScanCollider, ScanContact, ScanPlugin, ScanWorld, Scans, pose_of, ray_of,
@@ -31,13 +31,17 @@ use tracing::{Event, Level, Metadata, Subscriber};
 const PATIENCE: u32 = 20_000;
 
 fn app(folder: &Path) -> App {
+    app_with(folder, ScanPlugin::default())
+}
+
+fn app_with(folder: &Path, plugin: ScanPlugin) -> App {
     let mut app = App::new();
     let file_path = folder.to_string_lossy().into_owned();
     app.add_plugins((
         TaskPoolPlugin::default(),
         AssetPlugin { file_path, ..AssetPlugin::default() },
         TransformPlugin,
-        ScanPlugin::default(),
+        plugin,
     ));
     app
 }
@@ -229,14 +233,22 @@ fn contacts_begin_stay_and_end() {
 
 #[test]
 fn answers_equal_those_of_the_library() {
+    compare_answers(CollideOptions::estimated());
+}
+
+#[test]
+fn answers_about_thickened_points_equal_those_of_the_library() {
+    compare_answers(CollideOptions::estimated().with_semantics(Semantics::Thickened(0.2)));
+}
+
+fn compare_answers(options: CollideOptions) {
     let folder = TempDir::new().expect("a folder");
-    let mut app = app(folder.path());
+    let mut app = app_with(folder.path(), ScanPlugin { options });
     let (ring, floor) = (scan_of(&points_of_torus()), floor());
     let on_floor = spawn(&mut app, &floor, Transform::IDENTITY);
     let moving = spawn(&mut app, &ring, Transform::IDENTITY);
     app.update();
     let mut state = SystemState::<Scans<'_, '_>>::new(app.world_mut());
-    let options = CollideOptions::estimated();
     let plan = CollidePlan::new(&options, &floor, &ring).expect("a plan");
     let of_shapes = [&floor, &ring].map(|scan| ShapePlan::new(&options, scan).expect("a plan"));
     let (rng, mut scratch) = (&mut rng(7), Scratch::default());

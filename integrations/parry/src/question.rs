@@ -93,7 +93,8 @@ impl<'a> Question<'a> {
     /// The distance and the nearest points, if they are nearer than `within`.
     pub(crate) fn nearest(&self, within: Real) -> Result<Option<Nearest>, Unsupported> {
         if let Some((other, pair)) = self.pair() {
-            let plan = DistancePlan::new(&DistanceOptions::default(), self.scan.scan(), other.scan());
+            let options = DistanceOptions::default().with_semantics(self.scan.semantics());
+            let plan = DistancePlan::new(&options, self.scan.scan(), other.scan());
             let plan = plan.or(Err(Unsupported))?;
             let found = with_scratch(|scratch| pair.distance(&plan, scratch));
             return Ok((found.upper <= f64::from(within)).then_some((found.upper, found.points)));

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use parry3d::bounding_volume::{Aabb, BoundingSphere};
+use parry3d::bounding_volume::{Aabb, BoundingSphere, BoundingVolume as _};
 use parry3d::mass_properties::MassProperties;
 use parry3d::math::{Real, Vector};
 use parry3d::query::{PointProjection, PointQuery, Ray as ParryRay, RayCast, RayIntersection};
@@ -67,7 +67,7 @@ impl ScanShape {
     pub fn with_options(scan: Scan, options: &CollideOptions) -> Result<Self, PlanError> {
         let plan = ShapePlan::new(options, &scan)?;
         CollidePlan::new(options, &scan, &scan)?;
-        let bounds = bounds(&scan, &Pose::IDENTITY);
+        let bounds = bounds(&scan, &Pose::IDENTITY, options);
         let mass = Mass::default();
         Ok(Self(Arc::new(Inner { scan, options: *options, plan, pose: Pose::IDENTITY, bounds, mass })))
     }
@@ -79,7 +79,7 @@ impl ScanShape {
     /// `shape.placed(&pose).solid()?`.
     #[must_use]
     pub fn placed(self, pose: &Pose) -> Self {
-        let bounds = bounds(&self.0.scan, pose);
+        let bounds = bounds(&self.0.scan, pose, &self.0.options);
         let mass = self.0.mass.moved(&pose.after(&self.0.pose.inverse()));
         Self(Arc::new(Inner { pose: *pose, bounds, mass, ..Arc::unwrap_or_clone(self.0) }))
     }
@@ -154,9 +154,10 @@ impl ScanShape {
 }
 
 /// Box around all discs and balls of a scan, in the frame into which `pose` maps it.
-fn bounds(scan: &Scan, pose: &Pose) -> Aabb {
+fn bounds(scan: &Scan, pose: &Pose, options: &CollideOptions) -> Aabb {
+    let growth = to_real(options.semantics.growth());
     match scan.at(pose).bounds() {
-        Some(bounds) => Aabb::new(to_vector(bounds.min), to_vector(bounds.max)),
+        Some(bounds) => Aabb::new(to_vector(bounds.min), to_vector(bounds.max)).loosened(growth),
         // A pose out of range: the shape touches nothing.
         None => Aabb::new_invalid(),
     }

@@ -1,7 +1,7 @@
 //! Answers about a scan agree with those of nearmiss itself, and of parry about the exact surface.
 
 use nearmiss::geometry::PointCloud;
-use nearmiss::{BuildOptions, CollideOptions, Scan, Scratch, Shape, ShapePlan, Target};
+use nearmiss::{BuildOptions, CollideOptions, Scan, Scratch, Semantics, Shape, ShapePlan, Target};
 use nearmiss_parry::{ScanDispatcher, ScanShape, from_pose, to_pose};
 use parry3d::math::{Pose, Vector};
 use parry3d::query::{
@@ -166,6 +166,34 @@ fn answers_are_those_of_nearmiss() {
         touching += usize::from(answer);
     }
     assert!((50..950).contains(&touching), "{touching} of 1000 touch");
+}
+
+/// Balls about the points reach beyond the box of the scan.
+#[test]
+fn thickened_points_are_found_by_all_questions() {
+    let dispatcher = dispatcher();
+    let options = CollideOptions::estimated().with_semantics(Semantics::Thickened(0.3));
+    let floor = ScanShape::with_options(floor().scan().clone(), &options).expect("for shapes");
+    let top = floor.compute_local_aabb().maxs.y;
+    assert!((0.3..0.33).contains(&top), "the box ends at {top}");
+    let ball: SharedShape = SharedShape::ball(0.1);
+    let parts = SharedShape::compound(vec![(Pose::translation(0.0, 0.01, 0.0), ball.clone())]);
+    for (shape, up) in [(&ball, 0.39), (&parts, 0.38)] {
+        let pose = Pose::translation(0.5, up, 0.5);
+        let meets = dispatcher.intersection_test(&pose, &floor, &**shape).expect("supported");
+        assert!(meets.intersecting, "a ball at {up}");
+        let above = Pose::translation(0.5, up + 0.7, 0.5);
+        let (fall, options) = (Vector::new(0.0, -1.0, 0.0), ShapeCastOptions::with_max_time_of_impact(10.0));
+        let hit = dispatcher.cast_shapes(&above, fall, &floor, &**shape, options).expect("supported");
+        let time = hit.expect("a hit").time_of_impact;
+        assert!((time - 0.69).abs() < 1e-3, "after {time}");
+    }
+    let ray = Ray::new(Vector::new(0.5, 1.0, 0.5), Vector::new(0.0, -1.0, 0.0));
+    let time = floor.cast_local_ray(&ray, 10.0, true).expect("a hit");
+    assert!((time - 0.7).abs() < 1e-3, "{time}");
+    let distance = dispatcher.distance(&Pose::translation(0.0, 1.0, 0.0), &floor, &floor);
+    let distance = distance.expect("supported").distance;
+    assert!((distance - 0.4).abs() < 1e-5, "{distance}");
 }
 
 #[test]

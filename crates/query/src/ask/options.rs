@@ -37,6 +37,16 @@ impl Semantics {
         }
     }
 
+    /// Returns the distance by which what counts of a scan may exceed the [box](crate::Placed::bounds) of the
+    /// scan, in world units: the radius of thickened points, or 0.
+    #[must_use]
+    pub const fn growth(self) -> f64 {
+        match self {
+            Self::Thickened(radius) => radius,
+            Self::Obstacle | Self::Surface => 0.0,
+        }
+    }
+
     /// Returns `true` if surfaces are compared, alone or as parts of obstacles, instead of points
     /// alone.
     pub(crate) const fn is_of_surfaces(self) -> bool {
@@ -455,10 +465,7 @@ impl CollidePlan {
     /// is the reach of a [broad phase](crate::World::near_pairs) for this question.
     #[must_use]
     pub fn reach(&self) -> f64 {
-        match self.options.semantics {
-            Semantics::Thickened(radius) => 2.0 * radius + self.options.margin,
-            Semantics::Obstacle | Semantics::Surface => self.options.margin,
-        }
+        2.0 * self.options.semantics.growth() + self.options.margin
     }
 
     /// The plan of a search that only asks whether the scans meet, by the default method.

@@ -7,9 +7,10 @@ use crate::clash::components::{components, numbered};
 use crate::mesh::answer::MeshContact;
 use crate::mesh::solid::Parts;
 
-/// Ends of segments are the same if they are at most this share of the greatest coordinate apart. They are
-/// computed from different triangles, and rounded.
-const SAME: f64 = 1e-12;
+/// Ends of segments are the same if they are at most this share of the greatest coordinate apart, or that
+/// share of the size of all contacts. They are computed from different triangles, and rounded, also in the
+/// frames of the meshes, where coordinates may be greater.
+const SAME: [f64; 2] = [1e-12, 1e-8];
 
 /// The sine of the angle of triangles in one plane, at most.
 const FLAT: f64 = 1e-9;
@@ -23,8 +24,10 @@ const FLAT: f64 = 1e-9;
 pub(crate) fn curves(contacts: &[MeshContact]) -> Vec<usize> {
     let ends: Vec<[f64; 3]> = contacts.iter().flat_map(|contact| contact.ends).collect();
     let far = ends.as_flattened().iter().fold(0.0_f64, |far, x| far.max(x.abs()));
+    let size = Aabb::of(ends.iter().copied()).half_extents().into_iter().fold(0.0, f64::hypot);
+    let same = if contacts.is_empty() { 0.0 } else { (SAME[0] * far).max(SAME[1] * size) };
     let mut sets = Parts::new(contacts.len());
-    join_by(&components(&ends, SAME * far), &mut sets, |end| id32(end / 2));
+    join_by(&components(&ends, same), &mut sets, |end| id32(end / 2));
 
     let flat: Vec<usize> = (0..contacts.len()).filter(|&i| is_flat(&contacts[i])).collect();
     let middles: Vec<[f64; 3]> = flat.iter().map(|&i| contacts[i].point).collect();

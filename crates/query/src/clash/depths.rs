@@ -77,10 +77,8 @@ fn depth(
     while budget.go_on(0).is_continue() {
         room = room.min(most);
         match of_parts(&bounds.grown(room)) {
-            OfParts::Whole => {
-                answer.lower = whole.lower;
-                break;
-            }
+            // The bound of the whole things may be that of another clash.
+            OfParts::Whole => break,
             OfParts::Unknown => {}
             OfParts::Found(found) => {
                 answer.lower = answer.lower.max(found.lower).min(answer.upper);

@@ -2,7 +2,6 @@
 
 use nearmiss_geometry::Aabb;
 
-use crate::ask::options::Semantics;
 use crate::distance::DistancePlan;
 use crate::many::body::{BodyDistance, PlacedBody};
 use crate::many::world::{Bodies, BodyId, World};
@@ -28,7 +27,7 @@ pub struct NearestPair {
 impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
     /// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within
     /// `reach`, which may be infinite. The boxes of scans include the balls of
-    /// [`Semantics::Thickened`]. `counts` leaves pairs out, such as neighbouring links of a robot. `None` if
+    /// [`Semantics::Thickened`](crate::Semantics::Thickened). `counts` leaves pairs out, such as neighbouring links of a robot. `None` if
     /// no pair counts.
     ///
     /// Pairs are compared in the order of the gaps between their boxes, until a gap exceeds the least
@@ -65,10 +64,7 @@ impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
         plan: &DistancePlan,
         scratch: &mut Scratch,
     ) -> Option<NearestPair> {
-        let radius = match plan.options().semantics {
-            Semantics::Thickened(radius) => radius,
-            Semantics::Obstacle | Semantics::Surface => 0.0,
-        };
+        let radius = plan.options().semantics.growth();
         // The boxes of the broad phase do not contain the balls about points.
         let thickness = |pair: [BodyId; 2]| -> f64 {
             pair.map(|id| if let Some(PlacedBody::Scan(_)) = self.body(id) { radius } else { 0.0 })

@@ -61,7 +61,8 @@ impl<'a> MeshPairing<'a> {
             PlacedBalls::of([meshes[0].stored_to_world(), meshes[1].stored_to_world()], [*a.ball, *b.ball])?;
         let (stored, relative) = balls.relative();
         let leaves = [a, b].map(|mesh| mesh.tree.topology().leaves() as u64);
-        let meter = Meter::of_leaves(budget, leaves, LEAF_PAIR);
+        let pairs = (LEAF_TRIANGLES * LEAF_TRIANGLES) as u64;
+        let meter = Meter::of_leaves(budget, leaves, LEAF_PAIR + pairs * EXACT);
         let gap = balls.gap;
         Some(Self {
             meshes,
@@ -80,7 +81,8 @@ impl<'a> MeshPairing<'a> {
     /// The same pair, of a mesh with itself: only triangles without a common corner are compared,
     /// and each two of them once.
     pub(crate) fn of_itself(self) -> Self {
-        Self { is_of_itself: true, ..self }
+        // Rounding would move triangles that touch apart.
+        Self { is_of_itself: true, pose: OnceCell::from(Pose::IDENTITY), ..self }
     }
 
     /// Returns `true` if these triangles are to be compared.

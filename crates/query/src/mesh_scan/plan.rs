@@ -2,7 +2,7 @@
 
 use nearmiss_hierarchy::PointHierarchy;
 
-use crate::ask::options::{CollideOptions, CollidePlan, Method, Order, PlanError, Semantics};
+use crate::ask::options::{CollideOptions, CollidePlan, Method, Order, PlanError};
 use crate::distance::DistancePlan;
 use crate::motion::plan::SweepPlan;
 
@@ -17,7 +17,7 @@ impl MeshScanPlan {
     /// Validates `options`.
     ///
     /// The options have the meaning that they have for two scans ([`CollideOptions`]), with one
-    /// difference: with [`Semantics::Thickened`] only the points of the scan have balls, as the mesh
+    /// difference: with [`Semantics::Thickened`](crate::Semantics::Thickened) only the points of the scan have balls, as the mesh
     /// is exact.
     ///
     /// # Errors
@@ -63,10 +63,7 @@ impl MeshScanPlan {
     /// as meeting.
     #[must_use]
     pub fn reach(&self) -> f64 {
-        match self.options.semantics {
-            Semantics::Thickened(radius) => radius + self.options.margin,
-            Semantics::Obstacle | Semantics::Surface => self.options.margin,
-        }
+        self.options.semantics.growth() + self.options.margin
     }
 
     /// The options that were validated, with the metric of the scan.

@@ -85,7 +85,12 @@ fn odd_rays(
 
 /// Returns `true` if the inside counts.
 pub(crate) fn counts(elements: &Elements<'_>, interior: Interior) -> bool {
-    interior == Interior::Solid && !matches!(elements.semantics, Semantics::Thickened(_))
+    counted(elements.semantics, interior) == Interior::Solid
+}
+
+/// The inside as it counts with these semantics: thickened points have none.
+pub(crate) fn counted(semantics: Semantics, interior: Interior) -> Interior {
+    if let Semantics::Thickened(_) = semantics { Interior::Hollow } else { interior }
 }
 
 /// The depth of a place in a solid scan.

@@ -3,9 +3,10 @@
 use nearmiss_geometry::{Pose, TriangleMesh};
 use nearmiss_hierarchy::{MeshBuildOptions, MeshHierarchy};
 use nearmiss_query::{
-    Budget, CollideOptions, Contact, ContactGroup, Contacts, Interior, MeshPair, MeshScanPair, MeshScanPlan,
-    MeshScratch, MeshSolid, Penetration, Placed, PlacedMesh, Scratch, default_link,
+    Budget, CollideOptions, Contact, ContactGroup, Contacts, Interior, MeshItself, MeshPair, MeshScanPair,
+    MeshScanPlan, MeshScratch, MeshSolid, Penetration, Placed, PlacedMesh, Scratch, default_link,
 };
+use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
 use nearmiss_testdata::shapes::{Form, cuboid, patch, sphere};
 
 use crate::clashes::scene;
@@ -334,4 +335,66 @@ fn each_clash_of_a_scan_and_a_mesh_has_the_depth_of_its_own_place() {
             }
         }
     }
+}
+
+/// Two spheres far from the origin of their input, placed near that of the world: rounding of the input's
+/// coordinates does not split their curve.
+#[test]
+fn large_coordinates_do_not_split_a_curve() {
+    let far = [4.5e6, 5.3e5, 120.0];
+    let ball = |x: f64| {
+        let own = sphere(1.0).tessellated(2.0 * SPACING);
+        let vertices = own.vertices().iter().map(|p| [p[0] + x + far[0], p[1] + far[1], p[2] + far[2]]);
+        let mesh = TriangleMesh::new(vertices.collect(), own.triangles().to_vec()).unwrap();
+        MeshHierarchy::build(&mesh, &MeshBuildOptions::default()).unwrap()
+    };
+    let (a, b) = (ball(0.0), ball(1.1));
+    let place = Pose::from_translation(far.map(|c| -c));
+    let pair = MeshPair::new(PlacedMesh::new(&a, &place), PlacedMesh::new(&b, &place));
+    let mut contacts = Vec::new();
+    pair.contacts(&mut contacts, &mut MeshScratch::default());
+    let groups = ContactGroup::of_meshes(&contacts);
+    assert!(contacts.len() > 100 && groups.len() == 1, "{} groups", groups.len());
+}
+
+/// Triangles of a mesh that only touch meet in every pose, as they do in the input.
+#[test]
+fn a_mesh_touches_itself_in_every_pose() {
+    let vertices = vec![
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.25, 0.25, 0.0],
+        [0.25, 0.5, 1.0],
+        [0.5, 0.25, 1.0],
+    ];
+    let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
+    let mesh = MeshHierarchy::build(&mesh, &MeshBuildOptions::default()).unwrap();
+    let rng = &mut rng(31);
+    for round in 0..200 {
+        let pose = rotation(rng).with_translation(point_in(rng, 10.0));
+        let (mut contacts, scratch) = (Vec::new(), &mut MeshScratch::default());
+        MeshItself::new(PlacedMesh::new(&mesh, &pose)).contacts(&mut contacts, scratch);
+        assert_eq!(contacts.len(), 1, "round {round}");
+    }
+}
+
+/// Dense parallel plates: all pairs of triangles of many leaves are compared, and the distance is exact.
+#[test]
+fn distances_of_parallel_plates_are_complete() {
+    let grid = |z: f64, off: f64| {
+        let count = 120_u32;
+        let at = |i: u32, j: u32| [0.01 * f64::from(i) + off, 0.01 * f64::from(j) + off, z];
+        let vertices = (0..count * count).map(|k| at(k / count, k % count)).collect();
+        let quads = (0..(count - 1) * (count - 1)).map(|k| (k / (count - 1)) * count + k % (count - 1));
+        let triangles =
+            quads.flat_map(|p| [[p, p + 1, p + count], [p + 1, p + count + 1, p + count]]).collect();
+        let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+        MeshHierarchy::build(&mesh, &MeshBuildOptions::default()).unwrap()
+    };
+    let (a, b) = (grid(0.0, 0.0), grid(1.0, 0.003));
+    let turned = Pose::from_axis_angle([0.3, 0.2, 1.0], 0.7);
+    let pair = MeshPair::new(PlacedMesh::new(&a, &turned), PlacedMesh::new(&b, &turned));
+    let found = pair.distance(&mut MeshScratch::default());
+    assert!(found.complete && found.lower > 1.0 - 1e-9 && (found.upper - 1.0).abs() < 1e-9, "{found:?}");
 }

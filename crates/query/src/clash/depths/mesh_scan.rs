@@ -14,6 +14,7 @@ use crate::mesh_scan::pair::MeshScanPair;
 use crate::mesh_scan::penetration::of_pieces;
 use crate::mesh_scan::plan::MeshScanPlan;
 use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::interior::counted;
 use crate::penetration::scans::Piece;
 use crate::question::Scratch;
 
@@ -33,7 +34,9 @@ impl MeshScanPair<'_> {
         told: &mut dyn FnMut(f64),
     ) -> Vec<Penetration> {
         let (scan, mesh) = (self.scan(), self.mesh());
-        let parted_scan = PartedScan { scan, interior, stored: stored_of(scan, contacts, 0) };
+        let interior_of_part = counted(plan.options().semantics, interior);
+        let stored = stored_of(scan, contacts, 0);
+        let parted_scan = PartedScan { scan, interior: interior_of_part, stored };
         let parted_mesh =
             PartedMesh::new(mesh, solid, || contacts.iter().map(|contact| contact.sources[1].0));
         let first = (0.5 * default_link([scan; 2])).max(plan.reach());

@@ -10,6 +10,7 @@ use crate::clash::depths::{OfParts, depth, each};
 use crate::clash::group::ContactGroup;
 use crate::clash::stored::stored_of;
 use crate::penetration::answer::{Interior, Penetration};
+use crate::penetration::interior::counted;
 use crate::penetration::scans::{Piece, of_pieces};
 use crate::question::{Pair, Scratch};
 
@@ -47,7 +48,7 @@ impl Pair<'_> {
         let scans = self.scans();
         let parted = [0, 1].map(|k: usize| PartedScan {
             scan: &scans[k],
-            interior: interiors[k],
+            interior: counted(plan.options().semantics, interiors[k]),
             stored: stored_of(&scans[k], contacts, k),
         });
         let first = (0.5 * default_link(scans.each_ref())).max(plan.reach());
