@@ -35,6 +35,7 @@ mod json_lines;
 mod label;
 mod matrix;
 mod memory;
+mod motion_words;
 mod output;
 mod parse;
 mod path;

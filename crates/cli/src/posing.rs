@@ -217,7 +217,8 @@ impl PoseProgress {
 }
 
 impl PoseFile {
-    fn open(path: &Path, fixed: [Option<Matrix>; 2], factors: [f64; 2]) -> Result<Self, CliError> {
+    /// Opens a file of poses. `fixed` are the poses of things that lines leave out, `factors` the units.
+    pub(crate) fn open(path: &Path, fixed: [Option<Matrix>; 2], factors: [f64; 2]) -> Result<Self, CliError> {
         let (lines, progress) = (TextLines::open(path)?, PoseProgress::default());
         Ok(Self { lines, format: None, is_empty: true, fixed, factors, progress })
     }

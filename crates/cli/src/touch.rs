@@ -3,8 +3,9 @@
 mod args;
 mod shapes;
 mod surface;
+mod swept;
 
-use nearmiss::{NearestPoint, Placed, Scan, Shape, ShapeIndex};
+use nearmiss::{NearestPoint, Placed, Scan, Shape, ShapeIndex, Target};
 use serde::Serialize;
 
 use crate::console::{Console, Results, now};
@@ -17,6 +18,7 @@ use crate::sentence::world_bounds;
 pub use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 use crate::touch::surface::{Asked, of_surface};
+use crate::touch::swept::along_path;
 use crate::units::UnitCheck;
 
 /// The JSON output of `touch`.
@@ -43,7 +45,15 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     // The sampling radius in world units.
     let r = scan.sampling_radius() * pose.scale();
     match asked {
-        Some(asked) => of_surface(&scan.at(&pose), asked, &mut shapes, (r, args.json)),
+        Some(asked) => {
+            let plan = asked.plan(&scan)?;
+            let placed = scan.at(&pose);
+            let target = Target::new(placed, &plan);
+            match &args.path {
+                Some(path) => along_path((&placed, &target), path, &mut shapes, (r, asked.margin, args.json)),
+                None => of_surface((&placed, &target), asked, &mut shapes, (r, args.json)),
+            }
+        }
         None => of_points(&scan, &scan.at(&pose), &mut shapes, (r, args.json)),
     }
 }

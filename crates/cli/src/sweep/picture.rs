@@ -8,9 +8,9 @@ use nearmiss_draw::legend;
 use nearmiss_draw::marks::{frame, label, mark, title};
 use nearmiss_draw::picture::Picture;
 
-use super::report::time;
 use super::swept::Swept;
 use crate::digits::short;
+use crate::motion_words::time;
 use crate::path_plot::ticks;
 use crate::picture::{
     GAP, GROUND, HALO, INK, LARGEST, LEGEND, PANEL, PANEL_GROUND, SMALL, Style, dot, half_diagonal,

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::digits::{count, place, rough, rounded_down, short, work};
 use crate::evidence::word;
+use crate::motion_words::{reason_word, time, time_down};
 
 /// The JSON output of `sweep`. Times count lines from the first one, which is at 0.
 #[derive(Debug, Serialize)]
@@ -195,25 +196,4 @@ impl Report {
         );
         format!("t counts poses, the first is 0; {}; {cost}", queries.join(", "))
     }
-}
-
-fn reason_word(reason: SweepReason) -> &'static str {
-    match reason {
-        SweepReason::Near => "near",
-        SweepReason::Budget => "budget",
-        SweepReason::Pose => "pose",
-        SweepReason::Geodesic => "geodesic",
-        _ => "unknown",
-    }
-}
-
-/// Formats a time.
-pub(super) fn time(t: f64) -> String {
-    let text = format!("{t:.4}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
-/// Formats a time up to which something is proven: never later.
-fn time_down(t: f64) -> String {
-    time((t * 1e4).floor() / 1e4)
 }

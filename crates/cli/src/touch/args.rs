@@ -41,6 +41,16 @@ pub struct TouchArgs {
     /// Shapes within this distance of the surface touch it; needs --surface or --thickened
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius)]
     pub margin: Option<f64>,
+    /// Move each shape along the poses of this file and report the first impact; needs --surface or
+    /// --thickened
+    ///
+    /// The file has one pose on each line, in the forms that `sweep --path` takes. The poses move the
+    /// shapes from where they are given to the world. From line to line the shapes move by a screw: a
+    /// steady rotation about an axis and a steady shift along it. The answer proves the motion free, or
+    /// gives the time of the first impact and the time up to which the motion is proven free. Times
+    /// count lines from the first one, which is at 0. With --margin, shapes must keep that distance.
+    #[arg(long, alias = "poses", value_name = "FILE", conflicts_with = "penetration")]
+    pub path: Option<PathBuf>,
     /// Also report how far and in which direction to move each shape out of the scan; needs --surface or
     /// --thickened
     ///

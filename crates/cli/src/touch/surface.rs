@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use nearmiss::{
-    Budget, CollideOptions, Deadline, Interior, Placed, Reason, Scratch, Semantics, Shape, ShapeContact,
-    ShapePlan, ShapeVerdict, Target,
+    Budget, CollideOptions, Deadline, Interior, Placed, PlanError, Reason, Scan, Scratch, Semantics, Shape,
+    ShapeContact, ShapePlan, ShapeVerdict, Target,
 };
 use serde::Serialize;
 
@@ -23,7 +23,7 @@ use crate::units::UnitCheck;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked {
     semantics: Semantics,
-    margin: f64,
+    pub(super) margin: f64,
     /// The inside of the scan, if the penetration is wanted.
     interior: Option<Interior>,
     /// Limits for each penetration.
@@ -42,6 +42,10 @@ impl Asked {
                     "--penetration: expected --surface or --thickened beside it, got neither; add --surface";
                 return Err(CliError::Usage(what.to_owned()));
             }
+            None if args.path.is_some() => {
+                let what = "--path: expected --surface or --thickened beside it, got neither; add --surface";
+                return Err(CliError::Usage(what.to_owned()));
+            }
             None if args.margin.is_some() => {
                 let what = "--margin: expected --surface or --thickened beside it, got neither; points alone are \
                             compared without a margin, and `gap` tells how far they are";
@@ -58,6 +62,12 @@ impl Asked {
             time: args.budget,
             work: args.work,
         }))
+    }
+
+    /// Validates the question for a scan.
+    pub(super) fn plan(&self, scan: &Scan) -> Result<ShapePlan, PlanError> {
+        let options = CollideOptions::default().with_semantics(self.semantics).with_margin(self.margin);
+        ShapePlan::new(&options, scan)
     }
 
     /// Returns the budget of a penetration that starts now.
@@ -90,14 +100,11 @@ struct SurfaceReport<'a> {
 
 /// Tests shapes against the surface of a scan.
 pub(super) fn of_surface(
-    placed: &Placed<'_>,
+    (placed, target): (&Placed<'_>, &Target<'_>),
     asked: Asked,
     shapes: &mut ShapeFile,
     (r, is_json): (f64, bool),
 ) -> Result<(), CliError> {
-    let options = CollideOptions::default().with_semantics(asked.semantics).with_margin(asked.margin);
-    let plan = ShapePlan::new(&options, placed.scan())?;
-    let target = Target::new(*placed, &plan);
     let mut check = UnitCheck::new(world_bounds(placed), r);
     let (mut scratch, mut contacts, mut results) = (Scratch::default(), Vec::new(), Results::new());
     while let Some((line, text)) = shapes.next_line()? {
@@ -105,7 +112,7 @@ pub(super) fn of_surface(
         let (shape, label) = read.or_else(|fault| results.flush().and(Err(fault)))?;
         shape.compare(&mut check, line);
         let shape = shape.shape();
-        let report = answer(&target, &shape, &mut contacts, &mut scratch);
+        let report = answer(target, &shape, &mut contacts, &mut scratch);
         let Some(mut report) = report else {
             return results.flush().and(Err(shapes.too_far(line)));
         };

@@ -206,6 +206,59 @@ fn shapes_on_a_floor_have_contacts_with_the_surface() {
 }
 
 #[test]
+fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.08);
+    place.write("into.txt", "3 0 0 0 0 0 1\n-3 0 0 0 0 0 1\n");
+    place.write("past.jsonl", "# past it\n[3,0,0,0,0,0,1]\n{\"b\":[0,3,0,0,0,0,1]}\n[-3,0,0,0,0,0,1]\n");
+    place.write(
+        "shapes.jsonl",
+        r#"{"sphere":{"centre":[0,0,0],"radius":0.5},"name":"head"}
+{"capsule":{"ends":[[0,0,-0.5],[0,0,0.5]],"radius":0.2}}
+{"box":{"pose":[0,0,0,0,0,0,1],"half":[0.3,0.3,0.3]}}
+"#,
+    );
+    let asked = |path: &str, more: &[&str]| {
+        let args = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--surface", "--path", path];
+        place.ok(&[&args[..], more].concat())
+    };
+    let told = asked("into.txt", &["--json"]).json();
+    let expected = "verdict evidence t_free t_hit contact clearance clearance_at clearance_upper reason \
+                    distances micros";
+    assert_eq!(keys(&told[1]), sorted(expected));
+    assert_eq!(told[0]["name"], "head");
+    // The reach of each shape along the path, at whose end the path is at -3.
+    for (line, reach) in told.iter().zip([0.5, 0.2, 0.3]) {
+        let [free, hit] = ["t_free", "t_hit"].map(|key| line[key].as_f64().unwrap());
+        let exact = (3.0 - 1.0 - reach) / 6.0;
+        assert_eq!((&line["verdict"], &line["evidence"]), (&"impact".into(), &"estimated".into()), "{line}");
+        assert!((hit - exact).abs() < 0.01 && free <= hit && free > exact - 0.04, "{line}");
+        assert!(numbers(&line["contact"]["normal"])[0] > 0.9, "{line}");
+    }
+    for line in asked("past.jsonl", &["--json"]).json() {
+        let [kept, upper] = ["clearance", "clearance_upper"].map(|key| line[key].as_f64().unwrap());
+        assert_eq!((&line["verdict"], &line["evidence"]), (&"free".into(), &"certified".into()), "{line}");
+        assert!(line["t_free"] == 2.0 && kept > 0.3 && kept <= upper && upper < 1.0, "{line}");
+    }
+    // The path comes within 2.12 of the middle.
+    let near = asked("past.jsonl", &["--margin", "0.9", "--json"]).json();
+    assert!(near.iter().all(|line| line["verdict"] == "impact"), "{near:?}");
+    let people = asked("into.txt", &[]).results;
+    assert!(people.starts_with("line 1 (head): The shape hits the scan at t = 0.25, at "), "{people}");
+    let people = asked("past.jsonl", &[]).results;
+    assert!(people.contains("The whole motion is free (certified): always at least 0."), "{people}");
+
+    place.write("turned.jsonl", "{\"a\":[1,0,0,0,0,0,1]}\n");
+    let touch = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--path"];
+    let refused = |path: &str, more: &[&str], what: &[&str]| {
+        place.refused(2, &[&touch[..], &[path], more].concat(), what);
+    };
+    refused("into.txt", &[], &["--path", "--surface"]);
+    refused("turned.jsonl", &["--surface"], &["turned.jsonl", "line 1", "--pose"]);
+    refused("none.txt", &["--surface"], &["none.txt"]);
+}
+
+#[test]
 fn a_penetration_tells_the_way_out_of_a_ball() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.05);
