@@ -5,6 +5,8 @@ mod shapes;
 mod surface;
 mod swept;
 
+use std::path::Path;
+
 use nearmiss::{NearestPoint, Placed, Scan, Shape, ShapeIndex, Target};
 use serde::Serialize;
 
@@ -18,7 +20,7 @@ use crate::sentence::world_bounds;
 pub use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 use crate::touch::surface::{Asked, of_surface};
-use crate::touch::swept::along_path;
+use crate::touch::swept::{Route, along_path};
 use crate::units::UnitCheck;
 
 /// The JSON output of `touch`.
@@ -37,6 +39,11 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     let matrix = posing::from_option("--pose", args.pose.as_deref())?;
     let mut shapes = ShapeFile::open(&args.shapes)?;
     let asked = Asked::new(args)?;
+    if args.path.as_deref() == Some(Path::new("-")) && args.shapes == Path::new("-") {
+        let what = "--path: expected a file, got `-`, which --shapes reads; give one of them as a file";
+        return Err(CliError::Usage(what.to_owned()));
+    }
+    let route = args.path.as_deref().map(Route::read).transpose()?;
     let console = Console::new(args.quiet);
     let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
     let scan = opening.open(&args.scan)?;
@@ -49,8 +56,10 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
             let plan = asked.plan(&scan)?;
             let placed = scan.at(&pose);
             let target = Target::new(placed, &plan);
-            match &args.path {
-                Some(path) => along_path((&placed, &target), path, &mut shapes, (r, asked.margin, args.json)),
+            match &route {
+                Some(route) => {
+                    along_path((&placed, &target), route, &mut shapes, (r, asked.margin, args.json))
+                }
                 None => of_surface((&placed, &target), asked, &mut shapes, (r, args.json)),
             }
         }

@@ -168,6 +168,11 @@ impl CleanMesh {
                 *position
             })
             .collect();
+        let number = |v: u32| match used[v as usize] {
+            true => numbers[v as usize],
+            false => u32::try_from(left.len()).unwrap_or(u32::MAX).saturating_add(v),
+        };
+        let seams = seams.iter().map(|(_, t)| t.map(number)).collect();
         let report = CleanReport {
             vertices: vertices.len(),
             triangles: triangles.len(),
@@ -180,11 +185,7 @@ impl CleanMesh {
             vertices: left,
             triangles: remaining.iter().map(|(_, t)| t.map(|v| numbers[v as usize])).collect(),
             sources: remaining.iter().map(|(source, _)| *source).collect(),
-            seams: seams
-                .iter()
-                .filter(|(_, t)| t.iter().all(|&v| used[v as usize]))
-                .map(|(_, t)| t.map(|v| numbers[v as usize]))
-                .collect(),
+            seams,
             report,
         })
     }
@@ -209,7 +210,8 @@ impl CleanMesh {
 
     /// Vertex indices of triangles that were dropped but may connect others: those without area between
     /// three vertices, and one for each triangle that occurs equally often in both orientations, such as
-    /// the common wall of two boxes. With their edges, a mesh that was closed before is closed.
+    /// the common wall of two boxes. With their edges, a mesh that was closed before is closed. A vertex
+    /// that no triangle uses has a number beyond those of [`Self::vertices`].
     #[must_use]
     pub fn seams(&self) -> &[[u32; 3]] {
         &self.seams

@@ -59,19 +59,26 @@ impl Posable for Rigid {
 }
 
 /// The poses of a path.
-struct Route {
+pub(super) struct Route {
     file: PoseFile,
     lines: Vec<(u64, String)>,
 }
 
 impl Route {
-    fn read(path: &Path) -> Result<Self, CliError> {
+    /// Reads the lines of a file of poses.
+    pub(super) fn read(path: &Path) -> Result<Self, CliError> {
         let mut file = PoseFile::open(path, [None; 2], [1.0; 2])?;
         let mut lines = Vec::new();
         while let Some(line) = file.next_line()? {
             lines.push(line);
         }
         Ok(Self { file, lines })
+    }
+
+    /// The error about a pose at a distance that is not finite.
+    fn too_far(&self) -> CliError {
+        let what = "expected poses within measurable distance, got one too far away; check its units";
+        self.file.fault_on(self.lines.last().map_or(0, |line| line.0), what)
     }
 
     /// The motion of a shape along the path.
@@ -99,21 +106,24 @@ impl Route {
 /// Moves each shape along the path.
 pub(super) fn along_path(
     (placed, target): (&Placed<'_>, &Target<'_>),
-    path: &Path,
+    route: &Route,
     shapes: &mut ShapeFile,
     (r, margin, is_json): (f64, f64, bool),
 ) -> Result<(), CliError> {
-    let route = Route::read(path)?;
     let mut check = UnitCheck::new(world_bounds(placed), r);
     let (mut scratch, mut results) = (Scratch::default(), Results::new());
     while let Some((line, text)) = shapes.next_line()? {
         let mut ask = || -> Result<_, CliError> {
             let (shape, label) = shapes.shape(line, &text, r)?;
             let Some(bounds) = shape.shape().bounds() else { return Err(shapes.too_far(line)) };
-            shape.compare(&mut check, line);
             let motion = route.of(&Rigid { bounds, r })?;
-            let report = answer(target, (&shape, label), &motion, &mut scratch);
-            report.ok_or_else(|| shapes.too_far(line))
+            let first = Aabb::of(bounds.corners().map(|corner| motion.at(0.0).apply(corner)));
+            check.compare(&first, format_args!("the shape on line {line}, at the first pose,"));
+            match answer(target, (&shape, label), &motion, &mut scratch) {
+                (_, report) if report.reason == Some("shape") => Err(shapes.too_far(line)),
+                (_, report) if report.reason == Some("pose") => Err(route.too_far()),
+                told => Ok(told),
+            }
         };
         // Answers to the lines before a faulty one are written before the error.
         let (answer, report) = ask().or_else(|fault| results.flush().and(Err(fault)))?;
@@ -127,13 +137,13 @@ pub(super) fn along_path(
     results.flush()
 }
 
-/// Moves a shape past the scan. `None` if it is invalid, too far away or too large.
+/// Moves a shape past the scan.
 fn answer(
     target: &Target<'_>,
     (shape, label): (&ReadShape, Label),
     motion: &Motion,
     scratch: &mut Scratch,
-) -> Option<(ShapeSweep, SweptReport)> {
+) -> (ShapeSweep, SweptReport) {
     let start = now();
     let answer = target.sweep(&shape.shape(), motion, scratch);
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
@@ -163,12 +173,11 @@ fn answer(
             (report.verdict, report.evidence) = ("impact", Some(word(Evidence::Estimated)));
             (report.t_free, report.t_hit, report.contact) = (t_free, Some(t_hit), Some(contact));
         }
-        ShapeSweepVerdict::Undecided { reason: SweepReason::Pose | SweepReason::Shape, .. } => return None,
         ShapeSweepVerdict::Undecided { t_free, reason } => {
             (report.t_free, report.reason) = (t_free, Some(reason_word(reason)));
         }
     }
-    Some((answer, report))
+    (answer, report)
 }
 
 /// Returns the answer as a sentence. Places are rounded to `unit`.
@@ -203,6 +212,7 @@ fn sentence(answer: &ShapeSweep, margin: f64, unit: f64) -> String {
                 SweepReason::Near => {
                     format!("at t = {} the shape is nearer than can be proven apart", time_down(t_free))
                 }
+                SweepReason::Budget => "the search was longer than any should be".to_owned(),
                 _ => "the scan proves no separation".to_owned(),
             };
             format!("Cannot tell: {why}; no contact was found. {}", free_to(t_free))

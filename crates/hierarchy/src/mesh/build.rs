@@ -99,6 +99,7 @@ impl MeshHierarchy {
         hash.update(bytemuck::cast_slice(&self.arrays.vertices));
         hash.update(bytemuck::cast_slice(&self.arrays.triangles));
         hash.update(bytemuck::cast_slice(&self.arrays.seams));
+        hash.update(&(self.arrays.seams.len() as u64).to_le_bytes());
         hash.digest()
     }
 
@@ -309,7 +310,8 @@ fn in_order(clean: &CleanMesh, items: &[Item]) -> Ordered {
             })
         })
         .collect();
-    // Every vertex of a seam is that of a triangle.
-    let seams = clean.seams().iter().map(|t| t.map(|v| numbers[v as usize])).collect();
+    // A vertex that no triangle has keeps a number beyond theirs.
+    let number = |v: u32| numbers.get(v as usize).copied().unwrap_or(v);
+    let seams = clean.seams().iter().map(|t| t.map(number)).collect();
     Ordered { vertices, triangles, seams }
 }

@@ -93,7 +93,6 @@ impl MeshHierarchy {
         Flaw::first("vertex", vertices.iter().position(|p| !bounds.contains(*p)))?;
         let is_known = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < vertices.len());
         Flaw::first("triangle", triangles.iter().position(|t| !is_known(t)))?;
-        Flaw::first("seam", self.arrays.seams.iter().position(|t| !is_known(t)))?;
         self.check_sources(*given)?;
         let wrong = self.arrays.cells.iter().position(|&count| !(1..=CELLS).contains(&count));
         Flaw::first("the number of filled cells of node", wrong)?;

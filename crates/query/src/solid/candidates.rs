@@ -42,7 +42,7 @@ pub(crate) struct CandidateBlock {
     settled: u32,
     /// The lanes of points at borders of sheets that have not been looked at.
     borders: u32,
-    /// The lanes of the points near a slab.
+    /// The lanes of the points near a plane.
     slab: u32,
 }
 
@@ -56,13 +56,13 @@ pub(crate) struct CandidateLanes {
     pub(crate) borders: u32,
 }
 
-/// The points near a slab.
+/// The points near a plane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slab {
-    /// A place of the slab.
+    /// A place of the plane.
     pub(crate) at: [f32; 3],
     pub(crate) normal: [f32; 3],
-    /// The greatest distance from the slab.
+    /// The greatest distance from the plane.
     pub(crate) within: f32,
     /// The place from whose foot distances are measured.
     pub(crate) inside: [f32; 3],
@@ -293,13 +293,29 @@ impl CandidateBlocks {
         }
     }
 
-    /// The first point at a border of a sheet that was not near the plane of a [`Self::mark_slab`].
+    /// The first point at a border of a sheet for which [`Self::look_at`] was not called.
     pub(crate) fn first_border(&self) -> Option<Candidate> {
         self.lanes(|block| block.borders).min_by_key(|&candidate| self.point(candidate))
     }
 
-    /// Finds the points near a slab. Returns the greatest bound of their depths, and the least square of
-    /// their distances along the slab. O(n).
+    /// Returns `true` if the shape is behind the disc.
+    pub(crate) fn is_behind(&self, candidate: Candidate) -> bool {
+        let (block, lane) = self.at(candidate);
+        block.behind >> lane & 1 == 1
+    }
+
+    /// The candidates that the shape is not behind.
+    pub(crate) fn in_front(&self) -> impl Iterator<Item = Candidate> {
+        self.lanes(|block| block.lanes & !block.behind)
+    }
+
+    /// Leaves a point out of [`Self::first_border`].
+    pub(crate) fn look_at(&mut self, Candidate(n): Candidate) {
+        self.0[n as usize / WIDTH].borders &= !(1 << (n as usize % WIDTH));
+    }
+
+    /// Marks the points near a plane. Returns the greatest bound of their depths, and the least square of
+    /// their distances along the plane. O(n).
     pub(crate) fn mark_slab(&mut self, level: Level, slab: &Slab) -> [f32; 2] {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -314,9 +330,7 @@ impl CandidateBlocks {
         for block in &mut self.0 {
             let height = along(seen_from(simd, &block.centres, slab.at), slab.normal);
             let is_level: mask32x16<S> = height.abs().simd_le(slab.within);
-            let lanes = bits(is_level);
-            block.slab = lanes & (block.lanes | block.missed);
-            block.borders &= !lanes;
+            block.slab = bits(is_level) & (block.lanes | block.missed);
             let away = seen_from(simd, &block.centres, slab.inside);
             let up = along(away, slab.normal);
             nearness = nearness.max(among(simd, up * up - squared(away), block.slab));

@@ -103,8 +103,7 @@ pub(crate) fn contacts(
             // The visitor never breaks.
             let _whole = near.descend(level, &starts, search);
         }
-        for &(candidate, i, place) in ends.places(elements, solid, level, (found, scratch)) {
-            found.settle(candidate, places.len(), place.depth);
+        for &(i, place) in ends.settle(elements, solid, level, (found, scratch)) {
             places.push(Met { is_past_end: true, ..Met::new(elements, i, &place) });
         }
         let mut selection = Selection {

@@ -166,9 +166,9 @@ impl<'a> Elements<'a> {
         Self { detail: Detail::Verdict, ..*self }
     }
 
-    /// The same with another margin, in the stored frame.
-    pub(crate) fn within(&self, margin: f64) -> Self {
-        Self { margin, ..*self }
+    /// The discs and balls alone, without a margin.
+    pub(crate) fn bare(&self) -> Self {
+        Self { margin: 0.0, certifies: false, ..self.without_witness() }
     }
 
     /// The same with flat cells, as rays see them. Lower bounds on distances are then those from the discs,

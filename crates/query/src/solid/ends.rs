@@ -16,14 +16,20 @@ use crate::solid::touch::touch;
 
 type Vector = Vector3<f64>;
 
-/// The greatest number of sheets whose ends are looked at.
-const SHEETS: u32 = 8;
+/// The greatest numbers of points at borders, and of sheets, that are looked at.
+const BORDERS: u32 = 16;
+const SHEETS: u32 = 4;
 
 /// The least cosine of the normals of two discs of a sheet.
 const SAME: f64 = 0.7;
 
 /// The greatest distance of a disc from the plane of another one of the sheet, in local radii.
 const LEVEL: f32 = 1.0;
+
+/// The greatest distance of the centres of two discs of a sheet, in the sum of their radii, and the greatest
+/// number of discs for which it counts.
+const LINK: f64 = 1.6;
+const MOST_LINKED: usize = 256;
 
 /// Directions along a sheet that are compared, and halvings of the angle between two of them.
 const DIRECTIONS: u32 = 24;
@@ -49,11 +55,14 @@ const OVER: f32 = 0.35;
 /// The cosine of the angle between the way to a core that is behind a disc and the way inwards.
 const ACROSS: f64 = 0.5;
 
+/// The least sine of the angle between the normal and the way from the nearest disc to a core past the end.
+const LEAST: f64 = 0.05;
+
 /// Reusable memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SheetEnds {
     discs: Vec<Near>,
-    places: Vec<(Candidate, usize, Place)>,
+    places: Vec<(usize, Place)>,
 }
 
 /// A disc near the shape.
@@ -74,8 +83,25 @@ struct Sheet<'s> {
     discs: &'s [Near],
 }
 
-/// The furthest disc of a sheet in each of some directions along it.
-type Outermost = [FlatDisc; DIRECTIONS as usize];
+/// The furthest discs of a sheet in some directions along it.
+struct Outermost {
+    discs: [FlatDisc; DIRECTIONS as usize],
+    count: usize,
+}
+
+impl Outermost {
+    /// Adds a disc unless it is the last one.
+    fn push(&mut self, disc: FlatDisc) {
+        if self.count == 0 || self.discs[self.count - 1].centre != disc.centre {
+            self.discs[self.count] = disc;
+            self.count += 1;
+        }
+    }
+
+    fn all(&self) -> &[FlatDisc] {
+        &self.discs[..self.count]
+    }
+}
 
 /// The way past an end of a sheet.
 #[derive(Debug, Clone, Copy)]
@@ -96,34 +122,46 @@ impl Way {
 }
 
 impl SheetEnds {
-    /// The places at which `solid` moves out past the ends of sheets, with their candidates and points.
-    /// O(n) for n candidates, and nothing if none of them is at a border.
-    pub(crate) fn places<'s>(
+    /// Settles the candidates at which `solid` moves out past the ends of sheets. Returns their points and
+    /// places, in the order of their numbers from 0 on. O(n) for n candidates, and nothing if none of them is
+    /// at a border.
+    pub(crate) fn settle<'s>(
         &'s mut self,
         elements: &Elements<'_>,
         solid: &Solid<'_>,
         level: Level,
         (found, scratch): (&mut CandidateBlocks, &mut ViewScratch),
-    ) -> &'s [(Candidate, usize, Place)] {
+    ) -> &'s [(usize, Place)] {
         self.places.clear();
-        for _ in 0..SHEETS {
-            let Some(border) = found.first_border() else { break };
-            self.leave(elements, solid, (level, scratch), (found, border));
+        let mut sheets = 0;
+        for _ in 0..BORDERS {
+            let Some(border) = found.first_border().filter(|_| sheets < SHEETS) else { break };
+            sheets += u32::from(self.leave(elements, solid, (level, scratch), (found, border)));
         }
         &self.places
     }
 
-    /// Adds the places of the sheet to which a point at a border belongs, if the shape moves out past its end.
+    /// Settles the candidates of the sheet to which a point at a border belongs, if the shape moves out past
+    /// its end. Returns `false` if it clearly does not.
     fn leave(
         &mut self,
         elements: &Elements<'_>,
         solid: &Solid<'_>,
         (level, scratch): (Level, &mut ViewScratch),
         (found, border): (&mut CandidateBlocks, Candidate),
-    ) {
+    ) -> bool {
+        found.look_at(border);
         let i = found.point(border);
         let local = elements.arrays.radii[i];
         let (at, normal, band) = (elements.position(i), elements.normal(i), f64::from(local));
+        // The far side of a thin body is no way out.
+        let is_opposite = |candidate| {
+            let i = found.point(candidate);
+            elements.is_disc(i) && elements.normal(i).dot(&normal) <= -SAME
+        };
+        if found.is_behind(border) && found.in_front().any(is_opposite) {
+            return false;
+        }
         let slab = Slab {
             at: single(&at),
             normal: single(&normal),
@@ -132,46 +170,101 @@ impl SheetEnds {
         };
         let [most, beside_sq] = found.mark_slab(level, &slab);
         let beside = beside_sq.max(0.0).sqrt();
-        // A way past the end, up to 45° steep, is longer than the inner radius less the way to the nearest disc.
+        // At most 45° steep, a way past the end is longer than the inner radius less the way to the nearest
+        // disc.
         let height = (normal.dot(&(solid.inside - at))).abs();
         let least = solid.inner_radius() - FRAC_1_SQRT_2 * (height + f64::from(beside));
         if beside < OVER * local && f64::from(most) <= least {
-            return;
+            return false;
         }
+        self.gather(elements, found, &normal);
+        let border = FlatDisc { centre: at, normal, radius: f64::from(elements.arrays.discs.get(i)) };
+        let bare = elements.bare();
+        let mut ends = |sheet: &Sheet<'_>, way: &Way| {
+            let ball = Solid::ball((sheet.before(way), BALL * band));
+            touch(&bare, ball.as_ref(), None, (level, scratch)).verdict.is_separated()
+        };
+        let mut leaving = Sheet { elements, solid, border, band, discs: &self.discs }.leave(found, &mut ends);
+        if leaving.is_none() && connect(&mut self.discs, &border) {
+            leaving = Sheet { elements, solid, border, band, discs: &self.discs }.leave(found, &mut ends);
+        }
+        for near in &self.discs {
+            found.look_at(near.candidate);
+        }
+        let Some((way, is_past)) = leaving else { return true };
+        let sheet = Sheet { elements, solid, border, band, discs: &self.discs };
+        for &Near { candidate, i, disc } in sheet.discs {
+            let is_inner = !elements.is_at_border(i);
+            let place = if is_past { sheet.past(&disc, &way) } else { sheet.beside(&disc, &way, is_inner) };
+            if let Some(place) = place.filter(|_| !found.is_settled(candidate)) {
+                found.settle(candidate, self.places.len(), place.depth);
+                self.places.push((i, place));
+            }
+        }
+        true
+    }
+
+    /// Gathers the discs with a similar normal in the slab, in the order of their points.
+    fn gather(&mut self, elements: &Elements<'_>, found: &CandidateBlocks, normal: &Vector) {
         self.discs.clear();
         self.discs.extend(found.in_slab().filter_map(|candidate| {
             let i = found.point(candidate);
             let Element::Disc(disc) = elements.element(i) else { return None };
-            (disc.normal.dot(&normal).abs() >= SAME).then_some(Near { candidate, i, disc })
+            (disc.normal.dot(normal).abs() >= SAME).then_some(Near { candidate, i, disc })
         }));
-        let border = FlatDisc { centre: at, normal, radius: f64::from(elements.arrays.discs.get(i)) };
-        let sheet = Sheet { elements, solid, border, band, discs: &self.discs };
-        let bare = elements.without_witness().within(0.0);
-        let mut ends = |way: &Way| {
-            let ball = Solid::ball((sheet.before(way), BALL * band));
-            let answer = touch(&bare, ball.as_ref(), None, (level, scratch));
-            !answer.verdict.is_touching()
-        };
-        let Some((along, outermost)) = sheet.shortest_along(&mut ends) else { return };
-        let is_beyond = along.out.dot(&(solid.inside - at)) > along.end;
-        let way = sheet.shortest_about(&along, &outermost, TURNS);
-        let way = if ends(&way) { way } else { sheet.shortest_about(&along, &outermost, 0) };
-        let is_shorter = sheet.is_deeper(way.length(), found);
-        if !is_shorter && !is_beyond {
-            return;
-        }
-        let crosses = is_shorter && sheet.discs.iter().any(|near| sheet.crosses(&near.disc, &way));
-        for &Near { candidate, i, disc } in sheet.discs {
-            let place = if crosses { sheet.past(&disc, &way) } else { sheet.beside(&disc, &way) };
-            self.places.extend(place.map(|place| (candidate, i, place)));
-        }
+        self.discs.sort_unstable_by_key(|near| near.i);
     }
 }
 
+/// Keeps the discs that are connected to `border`, with at most [`LINK`] radii between two centres. Returns
+/// `true` if there are others. O(n²), so nothing for more than [`MOST_LINKED`] discs.
+fn connect(discs: &mut Vec<Near>, border: &FlatDisc) -> bool {
+    let count = discs.len();
+    if count > MOST_LINKED {
+        return false;
+    }
+    let is_linked = |a: &FlatDisc, b: &FlatDisc| {
+        (a.centre - b.centre).norm_squared() <= (LINK * (a.radius + b.radius)).powi(2)
+    };
+    // The discs before `done` are connected, and their neighbours are before `next`.
+    let Some(first) = discs.iter().position(|near| near.disc.centre == border.centre) else { return false };
+    discs.swap(0, first);
+    let (mut done, mut next) = (0, 1);
+    while done < next {
+        let disc = discs[done].disc;
+        for k in next..count {
+            if is_linked(&disc, &discs[k].disc) {
+                discs.swap(next, k);
+                next += 1;
+            }
+        }
+        done += 1;
+    }
+    discs.truncate(next);
+    discs.sort_unstable_by_key(|near| near.i);
+    next < count
+}
+
 impl Sheet<'_> {
+    /// The way on which the shape moves out past an end, and `true` if the core reaches through the sheet.
+    /// `None` if it moves out across the sheet.
+    fn leave(
+        &self,
+        found: &CandidateBlocks,
+        ends: &mut impl FnMut(&Self, &Way) -> bool,
+    ) -> Option<(Way, bool)> {
+        let (along, outermost) = self.shortest_along(ends)?;
+        if let Some(normal) = self.apart(&along) {
+            return (normal.dot(&along.out) > LEAST).then_some((along, false));
+        }
+        let way = self.shortest_about(&along, &outermost, TURNS);
+        let way = if ends(self, &way) { way } else { self.shortest_about(&along, &outermost, 0) };
+        self.is_deeper(way.length(), found).then_some((way, true))
+    }
+
     /// The shortest way past an end along the sheet, and the furthest discs in directions along the sheet.
     /// `None` if the sheet does not end near the shape.
-    fn shortest_along(&self, ends: &mut impl FnMut(&Way) -> bool) -> Option<(Way, Outermost)> {
+    fn shortest_along(&self, ends: &mut impl FnMut(&Self, &Way) -> bool) -> Option<(Way, Outermost)> {
         let normal = self.border.normal;
         let first = normal.cross(&Vector::ith(normal.iamin(), 1.0)).normalize();
         let second = normal.cross(&first);
@@ -181,16 +274,17 @@ impl Sheet<'_> {
             first * cos + second * sin
         };
         let mut ways = [None; DIRECTIONS as usize];
-        let mut outermost = [self.border; DIRECTIONS as usize];
-        for (k, (way, disc)) in (0_u32..).zip(ways.iter_mut().zip(&mut outermost)) {
-            *disc = self.furthest(&towards(k));
-            *way = Some(self.way([&*disc], towards(k)));
+        let mut outermost = Outermost { discs: [self.border; DIRECTIONS as usize], count: 0 };
+        for (k, way) in (0_u32..).zip(&mut ways) {
+            let disc = self.furthest(&towards(k));
+            *way = Some(self.way([&disc], towards(k)));
+            outermost.push(disc);
         }
         for _ in 0..TRIES {
             let left = ways.iter().copied().flatten();
             let shortest: Way = left.min_by(|a, b| a.length().total_cmp(&b.length()))?;
             let way = self.nearby(&outermost, shortest, &[normal], step);
-            if ends(&way) {
+            if ends(self, &way) {
                 return Some((way, outermost));
             }
             for other in &mut ways {
@@ -211,7 +305,7 @@ impl Sheet<'_> {
             let turned = along.out * turn.cos() + across * turn.sin();
             angles(RISES).map(move |rise| turned * rise.cos() + normal * rise.sin())
         });
-        let ways = outs.map(|out| self.way(outermost, out));
+        let ways = outs.map(|out| self.way(outermost.all(), out));
         let shortest = ways.fold(*along, |best, way| if way.length() < best.length() { way } else { best });
         let axes = [normal.cross(&shortest.out), normal];
         let best = self.nearby(outermost, shortest, &axes[..1 + usize::from(turns > 0)], step);
@@ -226,7 +320,7 @@ impl Sheet<'_> {
             for axis in axes {
                 for side in [-angle, angle] {
                     let turned = best.out + axis.cross(&best.out) * side;
-                    let way = self.way(discs, turned.normalize());
+                    let way = self.way(discs.all(), turned.normalize());
                     if way.length() < best.length() {
                         best = way;
                         break;
@@ -265,17 +359,29 @@ impl Sheet<'_> {
 
     /// Returns `true` if a contact across the sheet is deeper than this.
     fn is_deeper(&self, than: f64, found: &CandidateBlocks) -> bool {
-        self.discs.iter().any(|near| {
+        let is_behind = |near: &Near| found.is_behind(near.candidate);
+        let has_front = self.discs.iter().any(|near| !is_behind(near));
+        self.discs.iter().filter(|near| !has_front || !is_behind(near)).any(|near| {
             let most = || place_at(self.elements, self.solid, near.i, found.sign(near.candidate));
             found.most(near.candidate) > than && most().is_some_and(|place| place.depth > than)
         })
     }
 
-    /// Returns `true` if the core reaches through the sheet at a disc, or to behind the disc.
-    fn crosses(&self, disc: &FlatDisc, way: &Way) -> bool {
-        let gap = self.solid.gap(disc, f64::INFINITY);
-        let apart = gap.on_core - gap.on_disc;
-        gap.distance <= PRECISION * disc.radius || apart.dot(&way.out) < -ACROSS * gap.distance
+    /// The direction from the nearest disc to the core. `None` if the core reaches through the sheet, or to
+    /// behind a disc.
+    fn apart(&self, way: &Way) -> Option<Vector> {
+        let mut nearest = (f64::INFINITY, Vector::zeros());
+        for Near { disc, .. } in self.discs {
+            let Some(gap) = disc_gap(self.solid, disc, self.most(disc)) else { continue };
+            let apart = gap.on_core - gap.on_disc;
+            if gap.distance <= PRECISION * disc.radius || apart.dot(&way.out) < -ACROSS * gap.distance {
+                return None;
+            }
+            if gap.distance < nearest.0 {
+                nearest = (gap.distance, apart / gap.distance);
+            }
+        }
+        Some(nearest.1)
     }
 
     /// The place of a shape that moves out along `way`, at a disc.
@@ -286,15 +392,17 @@ impl Sheet<'_> {
     }
 
     /// The place of a shape whose core is before the end of the sheet, at a disc: along the way between their
-    /// nearest points. `None` if that does not lead out.
-    fn beside(&self, disc: &FlatDisc, way: &Way) -> Option<Place> {
-        let radius = self.solid.radius;
-        let gap = disc_gap(self.solid, disc, radius + self.elements.margin.max(disc.thickness()))?;
+    /// nearest points. `None` if that does not lead out, or if the shape does not touch a disc within the sheet.
+    fn beside(&self, disc: &FlatDisc, way: &Way, is_inner: bool) -> Option<Place> {
+        let gap = disc_gap(self.solid, disc, self.most(disc))?;
         let normal = (gap.on_core - gap.on_disc).try_normalize(PRECISION * disc.radius)?;
-        (normal.dot(&way.out) > 0.0).then_some(Place {
-            point: gap.on_disc,
-            normal,
-            depth: radius - gap.distance,
-        })
+        let depth = self.solid.radius - gap.distance;
+        let least = if is_inner { -disc.thickness() } else { f64::NEG_INFINITY };
+        (normal.dot(&way.out) > 0.0 && depth >= least).then_some(Place { point: gap.on_disc, normal, depth })
+    }
+
+    /// The distance within which the core counts.
+    fn most(&self, disc: &FlatDisc) -> f64 {
+        self.solid.radius + self.elements.margin.max(disc.thickness())
     }
 }

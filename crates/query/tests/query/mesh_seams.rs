@@ -70,6 +70,13 @@ fn triangles_without_area_close_a_solid() {
     triangles.push([0, 2, middle]);
     let closed = (vertices, triangles);
     assert!(is_near(depth(&closed, [0.0; 3]), 0.6), "{:?}", depth(&closed, [0.0; 3]));
+    // Three such triangles, about a vertex on the edge that no other one has.
+    let (mut vertices, mut triangles) = closed;
+    triangles.pop();
+    vertices.push([0, 1, 2].map(|k| 0.75 * vertices[0][k] + 0.25 * vertices[2][k]));
+    triangles.extend([[0, 2, 9], [0, 9, middle], [9, 2, middle]]);
+    let closed = (vertices, triangles);
+    assert!(is_near(depth(&closed, [0.0; 3]), 0.6), "{:?}", depth(&closed, [0.0; 3]));
 }
 
 #[test]

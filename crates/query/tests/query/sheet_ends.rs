@@ -223,3 +223,100 @@ fn a_body_on_the_border_of_a_plate_is_pushed_up() {
         }
     }
 }
+
+/// A body with its centre past the border of the plate on which it rests, or above which it hovers, has no
+/// contacts with the inside of the plate that push it sideways.
+#[test]
+fn a_body_across_the_border_has_no_contacts_against_the_plate() {
+    let mut oriented = plate(0.0);
+    oriented.turn_normals(&vec![[0.0, 0.0, 1.0]; oriented.len()]);
+    for scan in [plate(0.0), plate(0.4), oriented] {
+        let options = CollideOptions::default().with_margin(0.05);
+        let plan = ShapePlan::new(&options, &scan).unwrap();
+        let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+        let (mut contacts, mut scratch) = (Vec::new(), Scratch::default());
+        for x in [0.03, 0.08, 0.15] {
+            for depth in [-0.02, -0.002, 0.005, 0.02] {
+                let pose = Pose::from_translation([x, 0.01, 0.2 - depth]);
+                for radius in [0.0, 0.05] {
+                    let half = [0.3, 0.2, 0.2].map(|h| h - radius);
+                    target.contacts(&Shape::Box { pose, half, radius }, &mut contacts, &mut scratch);
+                    assert!(!contacts.is_empty(), "x {x}, depth {depth}");
+                    for contact in &contacts {
+                        assert!(contact.normal[2] > 0.9, "x {x}, depth {depth}, {radius}: {contacts:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Both halves of a wall with a doorway push a body back into it, each to its side.
+#[test]
+fn a_doorway_pushes_from_both_sides() {
+    let steps = |n: i32| (0..=n).map(|k| SPACING * f64::from(k));
+    let half =
+        |side: f64| steps(30).flat_map(move |x| steps(50).map(move |z| [side * (0.35 + x), 0.0, z - 0.2]));
+    let points: Vec<[f64; 3]> = half(-1.0).chain(half(1.0)).collect();
+    let scan = PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default());
+    let scan = scan.unwrap();
+    let (mut contacts, mut scratch) = (Vec::new(), Scratch::default());
+    for (margin, radius, x) in [(0.15, 0.3, -0.07), (0.15, 0.3, 0.07), (0.0, 0.37, 0.0), (0.0, 0.37, 0.01)] {
+        let options = CollideOptions::default().with_margin(margin);
+        let plan = ShapePlan::new(&options, &scan).unwrap();
+        let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+        let body = Shape::Capsule { ends: [[x, 0.0, 0.4], [x, 0.0, 1.4]], radius };
+        target.contacts(&body, &mut contacts, &mut scratch);
+        let mut sides = [0, 0];
+        for contact in &contacts {
+            let inwards = -contact.normal[0] * contact.point[0].signum();
+            assert!(inwards > 0.6, "{body:?}: {contacts:?}");
+            sides[usize::from(contact.point[0] > 0.0)] += 1;
+        }
+        assert!(sides.iter().all(|&count| count > 0), "{body:?}: {contacts:?}");
+        let deepest = radius - 0.35 + x.abs();
+        assert!((contacts[0].depth - deepest).abs() < 0.5 * scan.sampling_radius(), "{body:?}: {contacts:?}");
+    }
+}
+
+/// A table top with two scanned sides holds a body that overhangs its border.
+#[test]
+fn the_far_side_of_a_thin_body_is_no_way_out() {
+    for thickness in [0.03, 0.25] {
+        let mut points = Vec::new();
+        for i in 0..=40 {
+            for j in -30..=30 {
+                let [x, y] = [-SPACING * f64::from(i), SPACING * f64::from(j)];
+                points.extend([[x, y, 0.0], [x, y, -thickness]]);
+            }
+        }
+        let cloud = PointCloud::from_positions(&points).unwrap();
+        let mut scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let normals: Vec<[f32; 3]> = (0..scan.len())
+            .map(|i| {
+                [
+                    0.0,
+                    0.0,
+                    if Placed::new(&scan, &Pose::IDENTITY).point(i)[2] < -0.5 * thickness {
+                        -1.0
+                    } else {
+                        1.0
+                    },
+                ]
+            })
+            .collect();
+        scan.turn_normals(&normals);
+        let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+        let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+        let (mut contacts, mut scratch) = (Vec::new(), Scratch::default());
+        let depth = thickness + 0.01;
+        let pose = Pose::from_translation([0.0, 0.01, 0.5 - depth]);
+        target.contacts(
+            &Shape::Box { pose, half: [0.3, 0.2, 0.5], radius: 0.0 },
+            &mut contacts,
+            &mut scratch,
+        );
+        let first = contacts.first().expect("a contact");
+        assert!(first.normal[2] > 0.9 && (first.depth - depth).abs() < 0.01, "{thickness}: {contacts:?}");
+    }
+}
