@@ -241,7 +241,7 @@ fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
         assert!(line["t_free"] == 2.0 && kept > 0.3 && kept <= upper && upper < 1.0, "{line}");
     }
     // The path comes within 2.12 of the middle.
-    let near = asked("past.jsonl", &["--margin", "0.9", "--json"]).json();
+    let near = asked("past.jsonl", &["--margin", "1", "--json"]).json();
     assert!(near.iter().all(|line| line["verdict"] == "impact"), "{near:?}");
     let people = asked("into.txt", &[]).results;
     assert!(people.starts_with("line 1 (head): The shape hits the scan at t = 0.25, at "), "{people}");
