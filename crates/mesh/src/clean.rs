@@ -83,6 +83,9 @@ pub struct CleanReport {
     pub duplicate_triangles: usize,
 }
 
+/// The number of a triangle in the input, and its vertices.
+type Numbered = (u32, [u32; 3]);
+
 /// A triangle mesh in which all vertices are finite, distinct and used, all triangles have an area
 /// greater than zero, and no two triangles have the same three corners.
 ///
@@ -149,7 +152,7 @@ impl CleanMesh {
         let proper = |t: &[u32; 3]| {
             t[0] != t[1] && t[1] != t[2] && t[2] != t[0] && has_area(&t.map(|v| vertices[v as usize]))
         };
-        let (mut remaining, mut seams): (Vec<(u32, [u32; 3])>, Vec<(u32, [u32; 3])>) =
+        let (mut remaining, mut seams): (Vec<Numbered>, Vec<Numbered>) =
             (0..).zip(welded).partition(|(_, t)| proper(t));
         let degenerate_triangles = seams.len();
         seams.retain(|(_, t)| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
@@ -262,11 +265,11 @@ pub fn validate(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(), Cle
     Ok(())
 }
 
-/// Keeps the first of the triangles with the same corners, and returns the number of others. One of those that
-/// occur equally often in both orientations is added to `seams`.
-fn drop_duplicates(triangles: &mut Vec<(u32, [u32; 3])>, seams: &mut Vec<(u32, [u32; 3])>) -> usize {
+/// Keeps the first of the triangles with the same corners, and returns the number of others. One of those
+/// that occur equally often in both orientations is added to `seams`.
+fn drop_duplicates(triangles: &mut Vec<Numbered>, seams: &mut Vec<Numbered>) -> usize {
     let before = triangles.len();
-    let sorted = |&(source, corners): &(u32, [u32; 3])| {
+    let sorted = |&(source, corners): &Numbered| {
         let mut ordered = corners;
         ordered.sort_unstable();
         let least = corners.iter().position(|&v| v == ordered[0]).unwrap_or(0);

@@ -27,8 +27,8 @@ pub struct NearestPair {
 impl<S: Prepared, M: PreparedMesh, H: AsShape> World<S, M, H> {
     /// Finds the two bodies that are nearest to each other, of those whose bounding boxes come within
     /// `reach`, which may be infinite. The boxes of scans include the balls of
-    /// [`Semantics::Thickened`](crate::Semantics::Thickened). `counts` leaves pairs out, such as neighbouring links of a robot. `None` if
-    /// no pair counts.
+    /// [`Semantics::Thickened`](crate::Semantics::Thickened). `counts` leaves pairs out, such as
+    /// neighbouring links of a robot. `None` if no pair counts.
     ///
     /// Pairs are compared in the order of the gaps between their boxes, until a gap exceeds the least
     /// distance. Pairs with an invalid pose or shape are left out, as their distance is unknown. `plan` is

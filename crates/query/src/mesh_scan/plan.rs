@@ -17,8 +17,8 @@ impl MeshScanPlan {
     /// Validates `options`.
     ///
     /// The options have the meaning that they have for two scans ([`CollideOptions`]), with one
-    /// difference: with [`Semantics::Thickened`](crate::Semantics::Thickened) only the points of the scan have balls, as the mesh
-    /// is exact.
+    /// difference: with [`Semantics::Thickened`](crate::Semantics::Thickened) only the points of the
+    /// scan have balls, as the mesh is exact.
     ///
     /// # Errors
     /// Names the option that is out of range, or the metric that does not match. The methods and

@@ -115,7 +115,7 @@ struct Way {
 }
 
 impl Way {
-    /// How far the shape must move to be past the end.
+    /// The length of the shift with which the shape is past the end.
     fn length(&self) -> f64 {
         self.end - self.low
     }
@@ -232,11 +232,13 @@ fn connect(discs: &mut Vec<Near>, border: &FlatDisc) -> bool {
     let (mut done, mut next) = (0, 1);
     while done < next {
         let disc = discs[done].disc;
-        for k in next..count {
+        let mut k = next;
+        while k < count {
             if is_linked(&disc, &discs[k].disc) {
                 discs.swap(next, k);
                 next += 1;
             }
+            k += 1;
         }
         done += 1;
     }
@@ -294,8 +296,8 @@ impl Sheet<'_> {
         None
     }
 
-    /// The shortest way past the end that is at most [`STEEP`] to the sheet, and up to `turns` steps to either
-    /// side of that along the sheet.
+    /// The shortest way past the end that is at most [`STEEP`] to the sheet, and up to `turns` steps to
+    /// either side of that along the sheet.
     fn shortest_about(&self, along: &Way, outermost: &Outermost, turns: i32) -> Way {
         let normal = self.border.normal;
         let across = normal.cross(&along.out);
@@ -351,7 +353,7 @@ impl Sheet<'_> {
         Way { out, end, low }
     }
 
-    /// How far a disc reaches in a unit direction, from the centre of the border's disc.
+    /// The furthest place of a disc in a unit direction, from the centre of the border's disc.
     fn reach(&self, disc: &FlatDisc, out: &Vector) -> f64 {
         let rise = disc.normal.dot(out);
         out.dot(&(disc.centre - self.border.centre)) + disc.radius * (1.0 - rise * rise).max(0.0).sqrt()
@@ -392,7 +394,8 @@ impl Sheet<'_> {
     }
 
     /// The place of a shape whose core is before the end of the sheet, at a disc: along the way between their
-    /// nearest points. `None` if that does not lead out, or if the shape does not touch a disc within the sheet.
+    /// nearest points. `None` if that does not lead out, or if the disc is within the sheet and the shape
+    /// does not touch it.
     fn beside(&self, disc: &FlatDisc, way: &Way, is_inner: bool) -> Option<Place> {
         let gap = disc_gap(self.solid, disc, self.most(disc))?;
         let normal = (gap.on_core - gap.on_disc).try_normalize(PRECISION * disc.radius)?;

@@ -69,9 +69,9 @@ impl ShapePlan {
         Self { options: options.with_evidence(evidence) }
     }
 
-    /// Returns the distance from the [box](crate::Placed::bounds) of a scan, in world units, up to which a shape
-    /// may touch the scan. This is the reach of [`World::near_shape`](crate::World::near_shape) for this
-    /// question.
+    /// Returns the distance from the [box](crate::Placed::bounds) of a scan, in world units, up to which
+    /// a shape may touch the scan. This is the reach of
+    /// [`World::near_shape`](crate::World::near_shape) for this question.
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.options.semantics.growth() + self.options.margin

@@ -13,8 +13,8 @@ type Vector = Vector3<f64>;
 
 const SPACING: f64 = 0.05;
 
-/// A plate in the plane of x and y that ends at x = 0. Its points are off a lattice by up to this share of the
-/// spacing in each direction, and by a tenth of that across the plate.
+/// A plate in the plane of x and y that ends at x = 0. Its points are off a lattice by up to this share of
+/// the spacing in each direction, and by a tenth of that across the plate.
 fn plate(jitter: f64) -> PointHierarchy {
     let rng = &mut rng(11);
     let mut points = Vec::new();
