@@ -76,7 +76,7 @@ fn a_path_of_a_saved_mesh_is_answered_as_that_of_the_original() {
 }
 
 /// The golden file of the current version.
-const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/tetrahedron-v2.nm");
+const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/tetrahedron-v3.nm");
 
 fn tetrahedron() -> Mesh {
     let vertices = vec![[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.1, 0.0, 0.0]];
@@ -94,10 +94,14 @@ fn record_golden_mesh() {
 }
 
 #[test]
-fn the_golden_mesh_of_an_older_version_is_refused_by_name() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/tetrahedron-v1.nm");
-    let refused = Mesh::open(path, Check::Full).unwrap_err().to_string();
-    assert!(refused.contains("version 1") && refused.contains("prepare"), "{refused}");
+fn golden_meshes_of_older_versions_are_refused_by_name() {
+    for version in 1..=2 {
+        let folder = env!("CARGO_MANIFEST_DIR");
+        let path = format!("{folder}/tests/golden/tetrahedron-v{version}.nm");
+        let refused = Mesh::open(path, Check::Full).unwrap_err().to_string();
+        let is_named = refused.contains(&format!("version {version}")) && refused.contains("prepare");
+        assert!(is_named, "{refused}");
+    }
 }
 
 #[test]

@@ -231,6 +231,7 @@ fn lengths_that_contradict_each_other_are_refused() {
         writer.section(TAGS[2], 0, shorter(arrays.vertices, cut == 2)).unwrap();
         writer.section(TAGS[3], 0, shorter(arrays.triangles, cut == 3)).unwrap();
         writer.section(TAGS[4], 0, shorter(arrays.source, cut == 4)).unwrap();
+        writer.section(*b"SEAM", 0, arrays.seams).unwrap();
         writer.section(TAGS[5], 0, shorter(arrays.cells, cut == 5)).unwrap();
         let mut bytes = Vec::new();
         writer.write_to(&mut bytes).unwrap();
@@ -256,6 +257,7 @@ fn lengths_that_contradict_each_other_are_refused() {
     writer.section(TAGS[2], 0, arrays.vertices).unwrap();
     writer.section(TAGS[3], 0, &arrays.triangles[..0]).unwrap();
     writer.section(TAGS[4], 0, &arrays.source[..0]).unwrap();
+    writer.section(*b"SEAM", 0, arrays.seams).unwrap();
     writer.section(TAGS[5], 0, &arrays.cells[..0]).unwrap();
     let mut empty = Vec::new();
     writer.write_to(&mut empty).unwrap();
@@ -272,7 +274,7 @@ fn a_mesh_cut_anywhere_is_refused_even_if_its_header_owns_up() {
 
 #[test]
 fn a_mesh_of_another_version_or_another_kind_is_refused_by_name() {
-    for (version, remedy) in [(0, "prepare it again"), (3, "update the program"), (999, "update the program")]
+    for (version, remedy) in [(0, "prepare it again"), (4, "update the program"), (999, "update the program")]
     {
         let mut bytes = Vec::new();
         let mut writer = Writer::new(Mesh::KIND, version);
