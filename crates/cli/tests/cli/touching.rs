@@ -244,7 +244,7 @@ fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
     let near = asked("past.jsonl", &["--margin", "1", "--json"]).json();
     assert!(near.iter().all(|line| line["verdict"] == "impact"), "{near:?}");
     let people = asked("into.txt", &[]).results;
-    assert!(people.starts_with("line 1 (head): The shape hits the scan at t = 0.25, at "), "{people}");
+    assert!(people.starts_with("line 1 (head): The shape hits the scan at t = 0.24"), "{people}");
     let people = asked("past.jsonl", &[]).results;
     assert!(people.contains("The whole motion is free (certified): always at least 0."), "{people}");
 
