@@ -250,12 +250,12 @@ fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
 
     place.write("turned.jsonl", "{\"a\":[1,0,0,0,0,0,1]}\n");
     let touch = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--path"];
-    let refused = |path: &str, more: &[&str], what: &[&str]| {
-        place.refused(2, &[&touch[..], &[path], more].concat(), what);
+    let refused = |status: i32, path: &str, more: &[&str], what: &[&str]| {
+        place.refused(status, &[&touch[..], &[path], more].concat(), what);
     };
-    refused("into.txt", &[], &["--path", "--surface"]);
-    refused("turned.jsonl", &["--surface"], &["turned.jsonl", "line 1", "--pose"]);
-    refused("none.txt", &["--surface"], &["none.txt"]);
+    refused(2, "into.txt", &[], &["--path", "--surface"]);
+    refused(1, "turned.jsonl", &["--surface"], &["turned.jsonl", "line 1", "--pose"]);
+    refused(1, "none.txt", &["--surface"], &["none.txt"]);
 }
 
 #[test]
