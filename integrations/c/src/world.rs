@@ -392,8 +392,8 @@ pub unsafe extern "C" fn nearmiss_world_nearest_pair(
         let Some(nearmiss::NearestPair { ids, points, lower, upper }) = found else {
             // If pairs were near but none was found, their distances are unknown.
             let lower = if any_counts { 0.0 } else { reach };
-            let nobody = BodyPair { a: u64::MAX, b: u64::MAX };
-            return write(out, BodyDistance::beyond(nobody, lower, !any_counts));
+            let no_pair = BodyPair { a: u64::MAX, b: u64::MAX };
+            return write(out, BodyDistance::beyond(no_pair, lower, !any_counts));
         };
         let has_scan = ids.iter().any(|&id| matches!(world.get(id), Some(Body::Scan(_))));
         let pair = BodyPair { a: ids[0].0, b: ids[1].0 };

@@ -62,7 +62,7 @@ impl Moving {
         in_thread(py, None, &Progress::default(), move || moving.change_here(work))?.map_err(refused)
     }
 
-    /// Takes the lock in this thread, which is none of the pool, and then works in the pool.
+    /// Takes the lock in this thread, which must be outside the pool, then works in the pool.
     fn change_here(
         &self,
         work: impl FnOnce(&mut MovingScan) -> Result<&'static str, DeformError> + Send,

@@ -24,7 +24,7 @@ pub(crate) fn watched<T: Send + 'static>(
     in_thread(py, told, progress, move || in_pool(work))
 }
 
-/// Does the same, but runs `work` in the new thread alone, which is none of the pool and may wait for locks.
+/// Runs `work` in a new thread outside the pool, where it may wait for locks. Otherwise as [`watched`].
 pub(crate) fn in_thread<T: Send + 'static>(
     py: Python<'_>,
     told: Option<&Bound<'_, PyAny>>,
