@@ -2,9 +2,7 @@
 //! differ in their visitor, in the comparison of nodes and in the order of pairs.
 
 mod frontier;
-mod grid;
 mod single;
-mod starts;
 
 use std::ops::ControlFlow;
 
@@ -19,9 +17,7 @@ use crate::tree::topology::{FAN, NodePair};
 use crate::tree::wide::{LANES, Siblings, Tree, lanes_of, whole};
 
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
-pub use grid::NodeGrid;
 pub use single::PlaceVisitor;
-pub use starts::Starts;
 
 /// The callbacks of every descent over node pairs. Pairs are ordered by keys of type `K`.
 pub trait PairVisitor<K = f32> {

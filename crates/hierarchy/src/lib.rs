@@ -16,8 +16,8 @@ pub use bounds::growth::Growth;
 pub use bounds::lanes::{Boxes, along_normals};
 pub use bounds::part::Part;
 pub use descent::{
-    BoxVisitor, Comparison, Frontier, Heap, MostUrgent, NodeGrid, Open, PairVisitor, PlaceVisitor, Plunging,
-    Stack, Starts, TreePair, descend, resume,
+    BoxVisitor, Comparison, Frontier, Heap, MostUrgent, Open, PairVisitor, PlaceVisitor, Plunging, Stack,
+    TreePair, descend, resume,
 };
 pub use mesh::block::{LEAF_TRIANGLES, TriangleBlock};
 pub use mesh::build::{MeshHierarchy, MeshView};
@@ -40,10 +40,10 @@ pub use scan::deform_error::DeformError;
 pub use scan::deforming::DeformingScan;
 pub use scan::evaluate::NearField;
 pub use scan::intake::{GatheredPoints, IntakeError, PointGatherer};
+pub use scan::leaf_boxes::LeafBoxes;
 pub use scan::options::{BuildError, BuildOptions};
 pub use scan::outline::{Ball, Outline};
 pub use scan::points::ScanPoints;
-pub use scan::ray_boxes::ray_boxes;
 pub use scan::refit::Refitted;
 pub use scan::survey::SamplingSurvey;
 pub use tree::topology::{Children, Grandchildren, LaneNodes, MOST_LEAF_POINTS, NodePair, Topology};

@@ -9,6 +9,6 @@ pub use block::PointBlock;
 pub use cubes::Cubes;
 pub use fearless_simd::Level;
 pub use tree::{
-    BlockBoxes, BlockGrid, BlockTree, BoxRay, BoxTree, Cones, Nearest, Neighbour, Overlaps, RayBox,
-    RayVisitor, Skeleton, Slab,
+    BlockBoxes, BlockGrid, BlockTree, BoxBody, BoxGrid, BoxRay, BoxStarts, BoxTree, Cones, CutBox,
+    CutBoxVisitor, Nearest, Neighbour, Overlaps, Skeleton, Slab,
 };

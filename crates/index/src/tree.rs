@@ -11,21 +11,29 @@
 //! from its nearest corner, face or edge, never exceeds the distance of a point in it. The results
 //! therefore depend on the points alone.
 
+mod around;
+mod bodies;
 mod cells;
 mod cones;
+mod cut;
 mod near;
 mod nearest;
 mod overlaps;
 mod rays;
 mod skeleton;
+mod starts;
 mod walk;
 
+pub use bodies::BoxBody;
 pub use cells::BlockGrid;
 pub use cones::Cones;
+pub use cut::{BoxTree, CutBox, Slab};
 pub use nearest::{Nearest, Neighbour};
 pub use overlaps::Overlaps;
-pub use rays::{BoxRay, BoxTree, RayBox, RayVisitor, Slab};
+pub use rays::BoxRay;
 pub use skeleton::Skeleton;
+pub use starts::{BoxGrid, BoxStarts};
+pub use walk::CutBoxVisitor;
 
 use std::convert::Infallible;
 use std::ops::Range;

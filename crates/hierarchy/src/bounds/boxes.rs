@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_index::{RayBox, Slab};
+use nearmiss_index::{CutBox, Slab};
 use nearmiss_lanes::vector::{cross, dot, sub};
 use serde::{Deserialize, Serialize};
 
@@ -55,22 +55,25 @@ impl OrientedBox {
     }
 
     /// The upright box about this one, and the three slabs that it is the common part of, the thinnest first.
+    /// The inner part is another box with the same axes.
     #[expect(clippy::cast_possible_truncation, reason = "rounded outwards")]
-    pub(crate) fn for_rays(&self) -> RayBox {
+    pub(crate) fn cut(&self, inner: &Self) -> CutBox {
         let [min, max] = self.upright();
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| self.half[a].total_cmp(&self.half[b]));
-        let slab = |k: usize| {
-            let normal = self.axes[k];
-            let middle: f64 = (0..3).map(|j| f64::from(normal[j]) * f64::from(self.centre[j])).sum();
-            let half = 1.000_001 * f64::from(self.half[k]);
-            let between = [((middle - half) as f32).next_down(), ((middle + half) as f32).next_up()];
-            Slab { normal, between }
+        let between = |of: &Self, k: usize| {
+            let middle: f64 = (0..3).map(|j| f64::from(self.axes[k][j]) * f64::from(of.centre[j])).sum();
+            let half = 1.000_001 * f64::from(of.half[k]);
+            [((middle - half) as f32).next_down(), ((middle + half) as f32).next_up()]
         };
-        RayBox {
+        CutBox {
             min: min.map(|c| (c as f32).next_down()),
             max: max.map(|c| (c as f32).next_up()),
-            slabs: order.map(slab),
+            slabs: order.map(|k| Slab {
+                normal: self.axes[k],
+                between: between(self, k),
+                inner: between(inner, k),
+            }),
         }
     }
 

@@ -6,7 +6,6 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, mask32x4};
 use nearmiss_geometry::NodeId;
 
-use crate::descent::starts::Starts;
 use crate::tree::topology::{FAN, TREE_STACK};
 use crate::tree::wide::{Siblings, Tree, lanes_of};
 
@@ -60,28 +59,9 @@ impl Tree<'_> {
         place: [f32; 3],
         visitor: &mut V,
     ) -> ControlFlow<()> {
-        self.descend_from(level, &Starts::ROOT, place, visitor)
-    }
-
-    /// Visits a single leaf, by its number.
-    pub fn visit_leaf<V: PlaceVisitor>(&self, level: Level, leaf: usize, visitor: &mut V) -> ControlFlow<()> {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || visitor.leaf(simd, leaf),
-        ))
-    }
-
-    /// Does the same as [`Self::descend_to`] for the leaves below some nodes.
-    pub fn descend_from<V: PlaceVisitor>(
-        &self,
-        level: Level,
-        starts: &Starts<'_>,
-        place: [f32; 3],
-        visitor: &mut V,
-    ) -> ControlFlow<()> {
-        dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
-            || self.descend_from_by(simd, starts, place, visitor),
+            || self.descend_to_by(simd, place, visitor),
         ))
     }
 
@@ -93,20 +73,9 @@ impl Tree<'_> {
         place: [f32; 3],
         visitor: &mut V,
     ) -> ControlFlow<()> {
-        self.descend_from_by(simd, &Starts::ROOT, place, visitor)
-    }
-
-    #[inline(always)]
-    fn descend_from_by<S: Simd, V: PlaceVisitor>(
-        &self,
-        simd: S,
-        starts: &Starts<'_>,
-        place: [f32; 3],
-        visitor: &mut V,
-    ) -> ControlFlow<()> {
         let topology = self.topology;
         let mut stack = [(0.0, NodeId::ROOT); TREE_STACK];
-        let mut top = starts.put(&mut stack);
+        let mut top = 1;
         while top > 0 {
             top -= 1;
             let (least, node) = stack[top];

@@ -142,9 +142,9 @@ impl BlockTree<'_> {
         let best = (reach * reach, usize::MAX);
         let mut search = NearestTo { tree: self, lanes, skeleton, best, most: 0.0 };
         search.most = search.limit();
-        let root = (self.levels.len() - 1, 0, u32::MAX);
+        let groups = self.groups();
         // The walker never breaks.
-        let _whole = self.groups().walk_near(simd, root, &mut Stack::new(), &mut search);
+        let _whole = groups.walk_near(simd, groups.root(), &mut Stack::new(), &mut search);
         let (distance_sq, point) = search.best;
         (point < usize::MAX).then_some((point, distance_sq))
     }
@@ -215,7 +215,7 @@ impl<S: Simd, L: Lanes> NearWalker<S> for NearestTo<'_, L> {
     }
 
     #[inline(always)]
-    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
+    fn block(&mut self, simd: S, id: usize, _: f32) -> ControlFlow<()> {
         let tree = self.tree;
         let distances = self.lanes.of_points(simd, load(simd, &tree.blocks[id].position));
         let near: mask32x16<S> = distances.simd_le(self.most);

@@ -151,7 +151,7 @@ impl<S: Simd> NearWalker<S> for Search<'_, S> {
     }
 
     #[inline(always)]
-    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
+    fn block(&mut self, simd: S, id: usize, _: f32) -> ControlFlow<()> {
         self.offer(simd, id, false);
         ControlFlow::Continue(())
     }

@@ -4,61 +4,14 @@ use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_lanes::parallel::{both, map};
-use nearmiss_lanes::wide::{WIDTH, along, load};
-use nearmiss_store::Room;
+use nearmiss_lanes::wide::{along, load};
 
-use super::walk::{Groups, NearWalker, Stack};
-use super::{Boxes, fill_above, levels};
+use super::Boxes;
+use super::cut::{BoxTree, Slabs};
+use super::walk::{CutBoxVisitor, NearWalker, Stack};
 
 /// The least component of a direction by which lengths are divided.
 const LEAST: f32 = 1e-12;
-
-/// The number of slabs that cut a box.
-const SLABS: usize = 3;
-
-/// A tree over boxes, sixteen to a group, for rays.
-///
-/// Every box is upright, and cut by three slabs: a slab is the space between two parallel planes. The tree is
-/// packed: all groups are full but the last ones, and boxes of a group are close (Leutenegger, Lopez and
-/// Edgington 1997; here the longest axis is halved until a group is left).
-#[derive(Debug)]
-pub struct BoxTree {
-    /// The number of each box, in the order of the tree.
-    numbers: Vec<u32>,
-    levels: Vec<Room<Boxes>>,
-    /// The slabs of the boxes of each group of the first level.
-    slabs: Vec<[Slabs; SLABS]>,
-}
-
-/// A box of a [`BoxTree`].
-#[derive(Debug, Clone, Copy)]
-pub struct RayBox {
-    /// The least corner.
-    pub min: [f32; 3],
-    /// The greatest corner.
-    pub max: [f32; 3],
-    /// The slabs that cut it. A search compares them in this order, and takes least if the first ones exclude
-    /// most rays.
-    pub slabs: [Slab; SLABS],
-}
-
-/// The space between two parallel planes.
-#[derive(Debug, Clone, Copy)]
-pub struct Slab {
-    /// The unit normal.
-    pub normal: [f32; 3],
-    /// The least and the greatest product of the normal and a position in the slab.
-    pub between: [f32; 2],
-}
-
-/// Sixteen slabs side by side.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
-struct Slabs {
-    normal: [[f32; WIDTH]; 3],
-    between: [[f32; WIDTH]; 2],
-}
 
 /// A ray that boxes are compared with, or the path of a ball along it.
 #[derive(Debug, Clone, Copy)]
@@ -74,18 +27,6 @@ pub struct BoxRay {
     way: [f32; 3],
     /// The radius by which boxes are grown.
     radius: f32,
-}
-
-/// The callbacks of [`BoxTree::visit_along`].
-pub trait RayVisitor {
-    /// Returns the square of the distance along the ray beyond which boxes are skipped.
-    fn most_sq(&self) -> f32;
-
-    /// Told of a box that is visited later, unless the search ends before: the time to load what it is about.
-    fn foresee(&self, number: usize);
-
-    /// Visits a box, by its number. May end the search.
-    fn visit<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()>;
 }
 
 impl BoxRay {
@@ -138,103 +79,26 @@ impl Slabs {
 }
 
 impl BoxTree {
-    /// Builds the tree over `count` boxes. O(n log n).
-    #[must_use]
-    pub fn new(count: usize, of: impl Fn(usize) -> RayBox + Sync + Send) -> Self {
-        let boxes = map(count, of);
-        let mut order: Vec<([f32; 3], u32)> = (0..).zip(&boxes).map(|(i, own)| (own.middle(), i)).collect();
-        pack(&mut order);
-        let numbers: Vec<u32> = order.into_iter().map(|(_, number)| number).collect();
-        let empty = |groups| Ok::<_, std::convert::Infallible>(vec![Boxes::EMPTY; groups].into());
-        let mut levels = levels(count, empty).unwrap_or_else(|never| match never {});
-        let none = Slabs { normal: [[0.0; WIDTH]; 3], between: [[0.0; WIDTH]; 2] };
-        let mut slabs = vec![[none; SLABS]; count.div_ceil(WIDTH)];
-        if let Some((first, above)) = levels.split_first_mut() {
-            for (place, &number) in numbers.iter().enumerate() {
-                let (group, lane, own) = (place / WIDTH, place % WIDTH, &boxes[number as usize]);
-                let (boxes, slabs) = (&mut first[group], &mut slabs[group]);
-                for k in 0..3 {
-                    (boxes.min[k][lane], boxes.max[k][lane]) = (own.min[k], own.max[k]);
-                }
-                for (slabs, own) in slabs.iter_mut().zip(own.slabs) {
-                    for k in 0..3 {
-                        slabs.normal[k][lane] = own.normal[k];
-                    }
-                    (slabs.between[0][lane], slabs.between[1][lane]) = (own.between[0], own.between[1]);
-                }
-            }
-            fill_above(Level::new(), first, above);
-        }
-        Self { numbers, levels, slabs }
-    }
-
-    /// Returns the number of boxes.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.numbers.len()
-    }
-
-    /// Returns `true` if there are no boxes.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.numbers.is_empty()
-    }
-
     /// Visits the boxes along a ray, those of a group that it enters first before the others, until
     /// `visitor` ends the search. Does not allocate.
     #[inline]
-    pub fn visit_along<V: RayVisitor>(&self, level: Level, ray: &BoxRay, visitor: &mut V) -> ControlFlow<()> {
+    pub fn visit_along<V: CutBoxVisitor>(
+        &self,
+        level: Level,
+        ray: &BoxRay,
+        visitor: &mut V,
+    ) -> ControlFlow<()> {
         if self.is_empty() {
             return ControlFlow::Continue(());
         }
-        let groups = Groups { count: self.len(), levels: &self.levels };
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || {
                 let mut search = Along { tree: self, ray, visitor };
-                let root = (self.levels.len() - 1, 0, u32::MAX);
-                groups.walk_near(simd, root, &mut Stack::new(), &mut search)
+                self.groups().walk_near(simd, self.groups().root(), &mut Stack::new(), &mut search)
             },
         ))
     }
-}
-
-impl RayBox {
-    fn middle(&self) -> [f32; 3] {
-        [0, 1, 2].map(|k| 0.5 * self.min[k] + 0.5 * self.max[k])
-    }
-}
-
-/// Orders places so that runs of 16, 256, … are close together, with their numbers.
-fn pack(places: &mut [([f32; 3], u32)]) {
-    if places.len() <= WIDTH {
-        return;
-    }
-    // The places below a box of the highest level.
-    let mut below = WIDTH;
-    while below * WIDTH < places.len() {
-        below *= WIDTH;
-    }
-    halve(places, below);
-}
-
-/// Orders places so that runs of `below` are close together, and the places in each of these.
-fn halve(places: &mut [([f32; 3], u32)], below: usize) {
-    if places.len() <= below {
-        return pack(places);
-    }
-    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for (place, _) in &*places {
-        for k in 0..3 {
-            (low[k], high[k]) = (low[k].min(place[k]), high[k].max(place[k]));
-        }
-    }
-    let length = |k: &usize| high[*k] - low[*k];
-    let axis = (0..3).max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
-    let half = places.len().div_ceil(below).div_ceil(2) * below;
-    places.select_nth_unstable_by(half, |(a, i), (b, j)| a[axis].total_cmp(&b[axis]).then(i.cmp(j)));
-    let (left, right) = places.split_at_mut(half);
-    both(|| halve(left, below), || halve(right, below));
 }
 
 struct Along<'a, V> {
@@ -243,7 +107,7 @@ struct Along<'a, V> {
     visitor: &'a mut V,
 }
 
-impl<S: Simd, V: RayVisitor> NearWalker<S> for Along<'_, V> {
+impl<S: Simd, V: CutBoxVisitor> NearWalker<S> for Along<'_, V> {
     /// The squared distances along the ray at which it enters the boxes; infinite where it passes beside.
     #[inline(always)]
     fn distances_sq(&self, simd: S, (level, group): (usize, usize), boxes: &Boxes) -> f32x16<S> {
@@ -273,8 +137,8 @@ impl<S: Simd, V: RayVisitor> NearWalker<S> for Along<'_, V> {
     }
 
     #[inline(always)]
-    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
-        self.visitor.visit(simd, self.tree.numbers[id] as usize)
+    fn block(&mut self, simd: S, id: usize, least_sq: f32) -> ControlFlow<()> {
+        self.visitor.visit(simd, self.tree.numbers[id] as usize, least_sq)
     }
 }
 
@@ -284,31 +148,12 @@ mod tests {
     use nearmiss_testdata::instructions::levels;
 
     use super::*;
-
-    /// Notes the boxes that are visited, and the order.
-    #[derive(Default)]
-    struct Visited {
-        most: f32,
-        numbers: Vec<usize>,
-        last: Option<usize>,
-    }
-
-    impl RayVisitor for Visited {
-        fn most_sq(&self) -> f32 {
-            self.most * self.most
-        }
-
-        fn foresee(&self, _: usize) {}
-
-        fn visit<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
-            self.numbers.push(number);
-            if self.last == Some(number) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        }
-    }
+    use crate::tree::cut::CutBox;
+    use crate::tree::cut::samples::{Visited, random_boxes, single};
 
     /// Where a ray enters a box that is grown by `radius`, in double precision; `None` where it passes
     /// beside.
-    fn entry(of: &RayBox, [from, way]: [[f32; 3]; 2], radius: f64) -> Option<f64> {
+    fn entry(of: &CutBox, [from, way]: [[f32; 3]; 2], radius: f64) -> Option<f64> {
         let (mut enter, mut exit) = (0.0_f64, f64::INFINITY);
         let mut cut = |low: f64, high: f64, speed: f64| {
             let (low, high) = (low - radius, high + radius);
@@ -333,35 +178,12 @@ mod tests {
         (enter <= exit).then_some(enter)
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "random numbers")]
-    fn single(v: [f64; 3]) -> [f32; 3] {
-        v.map(|c| c as f32)
-    }
-
     #[test]
     fn all_boxes_along_a_ray_are_visited_and_no_others() {
         let rng = &mut rng(41);
         let (mut passed, mut missed) = (0, 0);
         for count in [0, 1, 15, 16, 17, 256, 257, 700, 5000] {
-            let boxes: Vec<RayBox> = (0..count)
-                .map(|i| {
-                    let [middle, [half, ..]] = [1.0, 0.1].map(|size| single(point_in(rng, size)));
-                    let half = half.abs();
-                    // Some are flat, some are all in one place.
-                    let middle = if count == 256 { [0.25, 0.5, -0.5] } else { middle };
-                    let slabs = [0, 1, 2].map(|k: usize| {
-                        let normal = if (i + k).is_multiple_of(3) {
-                            [0.0, 1.0, 0.0]
-                        } else {
-                            single(unit_vector(rng))
-                        };
-                        let at: f32 = (0..3).map(|k| normal[k] * middle[k]).sum();
-                        let thick = if (i + k).is_multiple_of(5) { 0.0 } else { [0.3, 0.6, 0.9][k] * half };
-                        Slab { normal, between: [at - thick, at + thick] }
-                    });
-                    RayBox { min: middle.map(|c| c - half), max: middle.map(|c| c + half), slabs }
-                })
-                .collect();
+            let boxes = random_boxes(rng, count);
             let tree = BoxTree::new(boxes.len(), |i| boxes[i]);
             assert_eq!((tree.len(), tree.is_empty()), (count, count == 0));
             for round in 0..60 {

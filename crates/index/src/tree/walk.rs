@@ -41,8 +41,20 @@ pub(super) trait NearWalker<S: Simd> {
         let _ = id;
     }
 
-    /// Visits a block. May end the traversal.
-    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()>;
+    /// Visits a block, which is at least at this squared distance. May end the traversal.
+    fn block(&mut self, simd: S, id: usize, least_sq: f32) -> ControlFlow<()>;
+}
+
+/// The callbacks of a search among the boxes of a [`BoxTree`](super::BoxTree).
+pub trait CutBoxVisitor {
+    /// Returns the squared distance beyond which boxes are skipped.
+    fn most_sq(&self) -> f32;
+
+    /// Told of a box that is visited later, unless the search ends before: the time to load what it is about.
+    fn foresee(&self, number: usize);
+
+    /// Visits a box, by its number, which is at least at this squared distance. May end the search.
+    fn visit<S: Simd>(&mut self, simd: S, number: usize, least_sq: f32) -> ControlFlow<()>;
 }
 
 /// A node to be visited.
@@ -61,6 +73,17 @@ impl Stack {
     #[inline(always)]
     pub(super) const fn new() -> Self {
         Self([Open { distance_sq: 0.0, level: 0, id: 0 }; MOST_LEVELS * WIDTH])
+    }
+
+    /// Puts groups of the first level on the stack, each with a lower bound on its squared distance.
+    #[inline(always)]
+    pub(super) fn put(&mut self, groups: impl Iterator<Item = (f32, u32)>) -> usize {
+        let mut top = 0;
+        for ((distance_sq, id), open) in groups.zip(&mut self.0) {
+            *open = Open { distance_sq, level: 1, id };
+            top += 1;
+        }
+        top
     }
 }
 
@@ -108,17 +131,34 @@ impl Groups<'_> {
         }
     }
 
+    /// The group of the highest level, and all of its lanes.
+    #[inline(always)]
+    pub(super) fn root(&self) -> (usize, usize, u32) {
+        (self.levels.len() - 1, 0, u32::MAX)
+    }
+
     /// Visits the blocks below the given lanes of a group of a level, siblings nearest first.
     #[inline(always)]
     pub(super) fn walk_near<S: Simd>(
         &self,
         simd: S,
-        (level, group, lanes): (usize, usize, u32),
-        Stack(stack): &mut Stack,
+        group: (usize, usize, u32),
+        stack: &mut Stack,
         walker: &mut impl NearWalker<S>,
     ) -> ControlFlow<()> {
-        let mut top = 0;
-        let mut next = Some((level, group, lanes));
+        self.walk_on(simd, Some(group), (stack, 0), walker)
+    }
+
+    /// Does the same below a group and below the first `top` nodes of the stack, of which the last comes
+    /// first.
+    #[inline(always)]
+    pub(super) fn walk_on<S: Simd>(
+        &self,
+        simd: S,
+        mut next: Option<(usize, usize, u32)>,
+        (Stack(stack), mut top): (&mut Stack, usize),
+        walker: &mut impl NearWalker<S>,
+    ) -> ControlFlow<()> {
         loop {
             if let Some((level, group, lanes)) = next.take() {
                 let distances = walker.distances_sq(simd, (level, group), &self.levels[level][group]);
@@ -150,7 +190,7 @@ impl Groups<'_> {
                 continue;
             }
             if level == 0 {
-                walker.block(simd, id)?;
+                walker.block(simd, id, distance_sq)?;
             } else {
                 next = Some((level - 1, id, u32::MAX));
             }

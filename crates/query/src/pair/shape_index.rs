@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use fearless_simd::Level;
-use nearmiss_hierarchy::{ClearanceGrid, NodeGrid, PointHierarchy, ray_boxes};
-use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree, BoxTree};
+use nearmiss_hierarchy::{ClearanceGrid, LeafBoxes, PointHierarchy};
+use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
 
 /// An index of the points and nodes of a scan, for testing thousands of shapes against its points
 /// ([`Placed::touches`](crate::Placed::touches)), or of shapes and rays against its surface
@@ -29,10 +29,8 @@ pub struct ShapeIndex {
     pub(crate) cells: BlockGrid,
     /// The surroundings of each place; `None` if some enclosure is unbounded.
     pub(crate) clear: Option<Arc<ClearanceGrid>>,
-    /// The nodes near each cell; `None` if some enclosure is unbounded.
-    pub(crate) nodes: Option<Arc<NodeGrid>>,
-    /// The boxes around the leaves, for rays; `None` if some enclosure is unbounded.
-    pub(crate) rays: Option<Arc<BoxTree>>,
+    /// The boxes around the leaves; `None` if some enclosure is unbounded.
+    pub(crate) leaves: Option<Arc<LeafBoxes>>,
     pub(crate) level: Level,
 }
 
@@ -43,11 +41,9 @@ impl ShapeIndex {
         let boxes = Arc::new(BlockBoxes::new(scan.blocks(), scan.len()));
         let level = Level::new();
         let cells = boxes.over(scan.blocks()).cells(level);
-        let radius = f64::from(scan.arrays().sampling_radius);
-        let nodes = NodeGrid::new(&scan.tree(), radius, scan.len(), level).map(Arc::new);
         let clear = ClearanceGrid::new(&scan.arrays(), level).map(Arc::new);
-        let rays = ray_boxes(&scan.arrays()).map(Arc::new);
-        Self { scan: scan.outline().identity, boxes, cells, clear, nodes, rays, level }
+        let leaves = LeafBoxes::new(&scan.arrays(), level).map(Arc::new);
+        Self { scan: scan.outline().identity, boxes, cells, clear, leaves, level }
     }
 
     /// Computes the surroundings of all places near the surface of `scan`, which must be the scan of this

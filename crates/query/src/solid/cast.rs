@@ -12,7 +12,7 @@ use fearless_simd::{Level, Simd, f32x4, mask32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{PlaceVisitor, PointKind, Siblings};
-use nearmiss_index::{BoxRay, RayVisitor};
+use nearmiss_index::{BoxRay, CutBoxVisitor};
 use nearmiss_lanes::wide::{Bits, product};
 use nearmiss_surface::Status;
 
@@ -111,8 +111,8 @@ pub(crate) fn crossings(
     };
     search.limit(ray.max);
     // Ends early if any hit will do.
-    let _ended = match elements.rays {
-        Some(rays) => rays.visit_along(level, &BoxRay::new(from, along, thick), &mut search),
+    let _ended = match elements.leaves {
+        Some(leaves) => leaves.visit_along(level, &BoxRay::new(from, along, thick), &mut search),
         None => elements.arrays.tree.descend_to(level, from, &mut search),
     };
     let evidence = elements.of_separation(search.is_doubtful);
@@ -335,7 +335,7 @@ impl Cast<'_, '_> {
     }
 }
 
-impl RayVisitor for Cast<'_, '_> {
+impl CutBoxVisitor for Cast<'_, '_> {
     #[inline(always)]
     fn most_sq(&self) -> f32 {
         self.most_sq
@@ -347,7 +347,7 @@ impl RayVisitor for Cast<'_, '_> {
     }
 
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+    fn visit<S: Simd>(&mut self, simd: S, number: usize, _: f32) -> ControlFlow<()> {
         self.look(simd, number)
     }
 }

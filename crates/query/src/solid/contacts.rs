@@ -98,10 +98,9 @@ pub(crate) fn contacts(
         if !is_far(elements, solid) {
             let mut near = Near::new(elements, solid, false, &mut scratch.corners);
             near.limit(elements.margin);
-            let starts = elements.starts(solid, elements.margin);
             let search = &mut Gather { near, sides: &sides, found: &mut *found };
-            // The visitor never breaks.
-            let _whole = near.descend(level, &starts, search);
+            // The search never ends early.
+            let _whole = near.search(level, elements.margin, search);
         }
         for &(i, place) in ends.settle(elements, solid, level, (found, scratch)) {
             places.push(Met { is_past_end: true, ..Met::new(elements, i, &place) });

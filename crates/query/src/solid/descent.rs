@@ -1,10 +1,11 @@
-//! The descent of a scan's tree towards a shape.
+//! The leaves of a scan near a shape.
 
 use std::ops::ControlFlow;
 
-use fearless_simd::{Level, Simd, f32x4};
+use fearless_simd::{Level, Simd, dispatch, f32x4};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Clearance, ClearanceGrid, PlaceVisitor, Starts, Tree};
+use nearmiss_hierarchy::{Clearance, ClearanceGrid, PlaceVisitor, Siblings, Tree};
+use nearmiss_index::{BoxBody, CutBoxVisitor};
 
 use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
@@ -21,8 +22,6 @@ pub(crate) struct Near<'s, 'a> {
     /// The distance from the core beyond which nothing is of interest, and its square.
     pub(crate) most: f32,
     pub(crate) most_sq: f32,
-    /// The squared distance of the node that is visited.
-    pub(crate) node_sq: f32,
 }
 
 impl<'s, 'a> Near<'s, 'a> {
@@ -35,7 +34,7 @@ impl<'s, 'a> Near<'s, 'a> {
     ) -> Self {
         let lane_box = LaneBox::new(solid, elements.far, solid.lane_core(corners));
         let (most, most_sq) = (f32::INFINITY, f32::INFINITY);
-        Self { elements, solid, lane_box, grown, most, most_sq, node_sq: 0.0 }
+        Self { elements, solid, lane_box, grown, most, most_sq }
     }
 
     /// Limits the search to this distance from the shape, in the stored frame.
@@ -51,32 +50,56 @@ impl<'s, 'a> Near<'s, 'a> {
         self.most_sq = (of_boxes * of_boxes).next_up();
     }
 
-    /// Visits the leaves within this distance of the shape, until `visitor` ends the search. `at` is what the
+    /// Visits the leaves within this distance of the shape, until the search ends itself. `at` is what the
     /// grid told about its centre.
     #[inline]
-    pub(crate) fn search<V: PlaceVisitor>(
+    pub(crate) fn search_at(
         &self,
         level: Level,
         at: Option<(&ClearanceGrid, Clearance<'_>)>,
         within: f64,
-        visitor: &mut V,
+        search: &mut impl LeafSearch<'s, 'a>,
     ) -> ControlFlow<()> {
         let (solid, most) = (self.solid, within + self.solid.radius);
         // Leaves are listed about a place: about a longer core there would be others, and a worse proof.
         let listed = at.filter(|_| solid.is_point());
-        let listed =
-            listed.and_then(|(grid, at)| grid.visit_near(level, (&at, solid.centre.into()), most, visitor));
-        listed.unwrap_or_else(|| self.descend(level, &self.elements.starts(solid, within), visitor))
+        let listed = listed.and_then(|(grid, at)| {
+            grid.visit_near(level, (&at, solid.centre.into()), most, &mut Leaves::of(search))
+        });
+        listed.unwrap_or_else(|| self.search(level, within, search))
     }
 
-    /// Visits the leaves near the shape below some nodes, until `visitor` ends the descent.
-    pub(crate) fn descend<V: PlaceVisitor>(
+    /// Visits the leaves within this distance of the shape, until the search ends itself.
+    pub(crate) fn search(
         &self,
         level: Level,
-        starts: &Starts<'_>,
-        visitor: &mut V,
+        within: f64,
+        search: &mut impl LeafSearch<'s, 'a>,
     ) -> ControlFlow<()> {
-        self.elements.arrays.tree.descend_from(level, starts, self.lane_box.centre, visitor)
+        let (elements, solid, lanes) = (self.elements, self.solid, &self.lane_box);
+        let visitor = &mut Leaves::of(search);
+        let Some(leaves) = elements.leaves.filter(|_| lanes.is_near) else {
+            return elements.arrays.tree.descend_to(level, lanes.centre, visitor);
+        };
+        let reach = within + solid.radius + elements.beyond_boxes();
+        let starts = leaves.near(solid.centre.into(), solid.half.norm(), reach);
+        if starts.is_some_and(|starts| starts.is_empty()) {
+            return ControlFlow::Continue(());
+        }
+        let body = BoxBody::new(lanes.centre, lanes.axes, lanes.half, !self.grown);
+        leaves.visit_near(level, (&body, starts.as_ref()), visitor)
+    }
+
+    /// Visits a single leaf, by its number.
+    pub(crate) fn visit_leaf(
+        level: Level,
+        leaf: usize,
+        search: &mut impl LeafSearch<'s, 'a>,
+    ) -> ControlFlow<()> {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || search.leaf(simd, leaf, 0.0),
+        ))
     }
 
     /// Lower bounds on the squared distances of the core from the children of a node.
@@ -86,15 +109,84 @@ impl<'s, 'a> Near<'s, 'a> {
         self.lane_box.of_nodes(simd, &nodes, self.grown)
     }
 
-    /// A lower bound on the distance of the shape from the enclosure of the node that is visited, in
-    /// the stored frame.
-    pub(crate) fn node_gap(&self) -> f64 {
-        f64::from(self.node_sq.sqrt() - self.lane_box.slack) - self.solid.radius
+    /// A lower bound on the distance of the shape, in the stored frame, from an enclosure at this squared
+    /// distance from its core.
+    pub(crate) fn node_gap(&self, least_sq: f32) -> f64 {
+        f64::from(least_sq.sqrt() - self.lane_box.slack) - self.solid.radius
     }
 
     /// A distance from the shape for one from the core in single precision.
     #[inline]
     pub(crate) fn gap_of_shape(&self, gap: f32) -> f64 {
         if self.lane_box.is_near { f64::from(gap) - self.solid.radius } else { f64::NEG_INFINITY }
+    }
+}
+
+/// A search among the leaves near a shape.
+pub(crate) trait LeafSearch<'s, 'a> {
+    /// The shape, and how near leaves have to be.
+    fn near(&self) -> &Near<'s, 'a>;
+
+    /// Visits a leaf, by its number, whose box or enclosure is at least at this squared distance from the
+    /// core. May end the search.
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize, least_sq: f32) -> ControlFlow<()>;
+}
+
+/// The callbacks of a search, for each structure that finds leaves.
+struct Leaves<'v, V> {
+    search: &'v mut V,
+    /// The squared distance of the node that is visited.
+    least_sq: f32,
+}
+
+impl<'v, V> Leaves<'v, V> {
+    fn of(search: &'v mut V) -> Self {
+        Self { search, least_sq: 0.0 }
+    }
+}
+
+impl<'s, 'a: 's, V: LeafSearch<'s, 'a>> PlaceVisitor for Leaves<'_, V> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.search.near().most_sq
+    }
+
+    #[inline(always)]
+    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
+        let near = self.search.near();
+        near.distances_sq(simd, &near.elements.arrays.tree, node)
+    }
+
+    #[inline(always)]
+    fn is_wanted(&mut self, _: NodeId, least_sq: f32) -> bool {
+        self.least_sq = least_sq;
+        least_sq <= self.search.near().most_sq
+    }
+
+    #[inline(always)]
+    fn foresee(&self, number: usize) {
+        self.search.near().elements.arrays.prefetch_leaf(number);
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        self.search.leaf(simd, number, self.least_sq)
+    }
+}
+
+impl<'s, 'a: 's, V: LeafSearch<'s, 'a>> CutBoxVisitor for Leaves<'_, V> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.search.near().most_sq
+    }
+
+    #[inline(always)]
+    fn foresee(&self, number: usize) {
+        self.search.near().elements.arrays.prefetch_leaf(number);
+    }
+
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, simd: S, number: usize, least_sq: f32) -> ControlFlow<()> {
+        self.search.leaf(simd, number, least_sq)
     }
 }

@@ -2,16 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use fearless_simd::{Level, Simd, f32x4};
-use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{PlaceVisitor, Siblings};
+use fearless_simd::{Level, Simd};
 use nearmiss_lanes::wide::Bits;
 
 use crate::ask::answer::Evidence;
 use crate::ask::options::Semantics;
 use crate::solid::answer::ShapeDistance;
 use crate::solid::core::{Gap, Solid};
-use crate::solid::descent::Near;
+use crate::solid::descent::{LeafSearch, Near};
 use crate::solid::elements::{Element, Elements};
 use crate::solid::plane::Plane;
 
@@ -85,8 +83,8 @@ pub(crate) fn nearest(
         // The descent bounds what is near again, with the enclosures of nodes.
         search.lower = none;
         let near = search.near;
-        let starts = elements.starts(solid, search.upper.min(most));
-        let _touching = near.descend(level, &starts, &mut search);
+        let within = search.upper.min(most);
+        let _touching = near.search(level, within, &mut search);
     }
     let (i, gap) = search.best.filter(|_| search.upper <= most)?;
     let upper = search.upper;
@@ -108,7 +106,7 @@ impl Apart<'_, '_> {
             return self.compare(elements.arrays.leaves.points(leaf).start + number);
         }
         let Some(leaf) = grid.leaf(place) else { return ControlFlow::Continue(()) };
-        elements.arrays.tree.visit_leaf(level, leaf, self)
+        Near::visit_leaf(level, leaf, self)
     }
 
     /// Compares the shape with the part of a point.
@@ -147,27 +145,16 @@ impl Apart<'_, '_> {
     }
 }
 
-impl PlaceVisitor for Apart<'_, '_> {
+impl<'s, 'a> LeafSearch<'s, 'a> for Apart<'s, 'a> {
     #[inline(always)]
-    fn most_sq(&self) -> f32 {
-        self.near.most_sq
+    fn near(&self) -> &Near<'s, 'a> {
+        &self.near
     }
 
     #[inline(always)]
-    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
-        self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
-    }
-
-    #[inline(always)]
-    fn is_wanted(&mut self, _: NodeId, least_sq: f32) -> bool {
-        self.near.node_sq = least_sq;
-        least_sq <= self.near.most_sq
-    }
-
-    #[inline(always)]
-    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize, least_sq: f32) -> ControlFlow<()> {
         let elements = self.near.elements;
-        let node_gap = self.near.node_gap();
+        let node_gap = self.near.node_gap(least_sq);
         if elements.semantics == Semantics::Surface {
             self.lower = self.lower.min(node_gap);
         }

@@ -4,10 +4,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{
-    ClearanceGrid, LeafBlock, NodeGrid, Part, PointKind, SLAB, ScanArrays, Starts, THICKNESS,
-};
-use nearmiss_index::BoxTree;
+use nearmiss_hierarchy::{ClearanceGrid, LeafBlock, LeafBoxes, Part, PointKind, SLAB, ScanArrays, THICKNESS};
 use nearmiss_lanes::wide::{Bits, bits};
 
 use crate::ask::answer::Evidence;
@@ -63,10 +60,8 @@ pub(crate) struct Elements<'a> {
     pub(crate) arrays: ScanArrays<'a>,
     /// The clearance at each place, if the scan has a shape index and the obstacle counts.
     pub(crate) clear: Option<&'a ClearanceGrid>,
-    /// The nodes near each place, if the scan has a shape index and the obstacle or points count.
-    pub(crate) nodes: Option<&'a NodeGrid>,
     /// The boxes around the leaves, if the scan has a shape index and the obstacle or points count.
-    pub(crate) rays: Option<&'a BoxTree>,
+    pub(crate) leaves: Option<&'a LeafBoxes>,
     /// The detail of contacts.
     pub(crate) detail: Detail,
     pub(crate) semantics: Semantics,
@@ -138,7 +133,7 @@ impl<'a> Elements<'a> {
             Semantics::Thickened(radius) => radius / scale,
             _ => 0.0,
         };
-        // The surface alone continues beyond the obstacle, in which the grid looks for nodes.
+        // The surface alone continues beyond the obstacle, which the boxes contain.
         let is_listed = options.semantics != Semantics::Surface;
         let bounds = placed.scan().root_box();
         let far = Vector3::from(bounds.centre).amax() + bounds.radius();
@@ -149,8 +144,7 @@ impl<'a> Elements<'a> {
                 .shapes()
                 .and_then(|index| index.clear.as_deref())
                 .filter(|_| options.semantics == Semantics::Obstacle),
-            nodes: placed.shapes().and_then(|index| index.nodes.as_deref()).filter(|_| is_listed),
-            rays: placed.shapes().and_then(|index| index.rays.as_deref()).filter(|_| is_listed),
+            leaves: placed.shapes().and_then(|index| index.leaves.as_deref()).filter(|_| is_listed),
             detail: options.detail,
             semantics: options.semantics,
             margin: options.margin / scale,
@@ -188,15 +182,6 @@ impl<'a> Elements<'a> {
     /// The radius by which points exceed the boxes of their nodes.
     pub(crate) fn beyond_boxes(&self) -> f64 {
         self.thickened
-    }
-
-    /// The nodes that contain all points whose parts are within this distance of a shape: those that the
-    /// scan's index lists or, without one, the root.
-    #[inline]
-    pub(crate) fn starts(&self, solid: &Solid<'_>, within: f64) -> Starts<'a> {
-        let reach = within + solid.radius + self.beyond_boxes();
-        let listed = self.nodes.and_then(|nodes| nodes.near(solid.centre.into(), solid.half.norm(), reach));
-        listed.unwrap_or(Starts::ROOT)
     }
 
     pub(crate) fn position(&self, i: usize) -> Vector {

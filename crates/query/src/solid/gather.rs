@@ -3,15 +3,14 @@
 use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
-use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{LeafBlock, PlaceVisitor, Siblings, THICKNESS};
+use fearless_simd::{Simd, f32x16, mask32x16};
+use nearmiss_hierarchy::{LeafBlock, THICKNESS};
 use nearmiss_lanes::wide::{Bits, along, bits, product};
 
 use crate::ask::options::Semantics;
 use crate::solid::candidates::{CandidateBlock, CandidateBlocks, CandidateLanes};
 use crate::solid::depths::LaneDiscs;
-use crate::solid::descent::Near;
+use crate::solid::descent::{LeafSearch, Near};
 use crate::solid::elements::{Element, Elements, Measured};
 use crate::solid::sides::Sides;
 
@@ -114,24 +113,14 @@ impl Gather<'_, '_> {
     }
 }
 
-impl PlaceVisitor for Gather<'_, '_> {
+impl<'s, 'a> LeafSearch<'s, 'a> for Gather<'s, 'a> {
     #[inline(always)]
-    fn most_sq(&self) -> f32 {
-        self.near.most_sq
+    fn near(&self) -> &Near<'s, 'a> {
+        &self.near
     }
 
     #[inline(always)]
-    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
-        self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
-    }
-
-    #[inline(always)]
-    fn foresee(&self, number: usize) {
-        self.near.elements.arrays.prefetch_leaf(number);
-    }
-
-    #[inline(always)]
-    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize, _: f32) -> ControlFlow<()> {
         let elements = self.near.elements;
         for part in elements.arrays.leaves.blocks(number) {
             self.block(simd, number, part);

@@ -2,10 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use fearless_simd::{Level, Simd, f32x4};
-use nearmiss_geometry::NodeId;
+use fearless_simd::{Level, Simd};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Clearance, ClearanceGrid, PlaceVisitor, Siblings};
+use nearmiss_hierarchy::{Clearance, ClearanceGrid};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::Bits;
 
@@ -14,7 +13,7 @@ use crate::ask::options::{Detail, Semantics};
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::{ShapeAnswer, ShapeVerdict};
 use crate::solid::core::Solid;
-use crate::solid::descent::Near;
+use crate::solid::descent::{LeafSearch, Near};
 use crate::solid::elements::Elements;
 use crate::solid::meeting::verified_in;
 use crate::solid::probe::{About, Probed, about, probe, probe_ball};
@@ -124,7 +123,7 @@ fn search(
     near.limit(elements.margin);
     let mut search = Touch { near, found: Findings::NONE };
     // An early end means that the question is settled.
-    let _settled = near.search(level, at, elements.margin, &mut search);
+    let _settled = near.search_at(level, at, elements.margin, &mut search);
     search.found.answer(elements, solid, scratch)
 }
 
@@ -207,24 +206,14 @@ impl Findings {
     }
 }
 
-impl PlaceVisitor for Touch<'_, '_> {
+impl<'s, 'a> LeafSearch<'s, 'a> for Touch<'s, 'a> {
     #[inline(always)]
-    fn most_sq(&self) -> f32 {
-        self.near.most_sq
+    fn near(&self) -> &Near<'s, 'a> {
+        &self.near
     }
 
     #[inline(always)]
-    fn distances_sq<S: Simd>(&self, simd: S, node: NodeId, _: &Siblings, _: [f32; 3]) -> f32x4<S> {
-        self.near.distances_sq(simd, &self.near.elements.arrays.tree, node)
-    }
-
-    #[inline(always)]
-    fn foresee(&self, number: usize) {
-        self.near.elements.arrays.prefetch_leaf(number);
-    }
-
-    #[inline(always)]
-    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize, _: f32) -> ControlFlow<()> {
         let Self { near: Near { elements, solid, lane_box, most, .. }, found } = self;
         let (solid, most) = (*solid, *most);
         if elements.certifies && elements.semantics == Semantics::Surface {
