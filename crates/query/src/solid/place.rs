@@ -134,23 +134,40 @@ pub(crate) fn disc_gap(solid: &Solid<'_>, disc: &FlatDisc, most: f64) -> Option<
     Some(solid.gap(disc, most)).filter(|gap| gap.distance <= most)
 }
 
-/// The contact with a ball: along the way from its centre to the core or, if the core contains it, to
-/// the inside of the shape.
+/// The contact with a ball: along the way from its centre to the core or, if the core contains it, on a short
+/// way out of the core.
 fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Option<Place> {
     let way = gap.on_core - centre;
-    let is_in = way.norm() <= solid.rounding(&centre);
-    let least = solid.half.imin();
-    let is_flat = solid.half[least] <= solid.rounding(&centre) && !solid.is_point();
-    // Out of a flat core, across it.
-    let normal = match (is_in, is_flat) {
-        (false, _) => way,
-        (true, false) => solid.inside - centre,
-        (true, true) => solid.axes[least],
+    let (normal, inside) = if way.norm() <= solid.rounding(&centre) {
+        way_out(solid, &centre)
+    } else {
+        (way.try_normalize(0.0).unwrap_or_else(Vector::z), 0.0)
     };
-    let normal = normal.try_normalize(0.0).unwrap_or_else(Vector::z);
-    let inside = if is_in { -normal.dot(&(solid.support(&-normal) - centre)) } else { 0.0 };
     let depth = solid.radius + radius - way.norm() + inside;
     Some(Place { point: centre + normal * radius, normal, depth }).filter(|it| it.depth.is_finite())
+}
+
+/// A direction in which the core moves away from a place in it, and the distance after which the place is
+/// outside: the shortest of those along the axes of the box about the core, across each of these axes, and to
+/// the inside of the shape. The shortest of all for boxes and cylinders.
+fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
+    let to = solid.inside - place;
+    let exit = |normal: Vector| (normal, -normal.dot(&(solid.support(&-normal) - place)));
+    let mut shortest = exit(to.try_normalize(0.0).unwrap_or_else(Vector::z));
+    if solid.is_point() {
+        return shortest;
+    }
+    for axis in solid.axes {
+        let along = axis.dot(&to);
+        let across = (to - axis * along).try_normalize(0.0);
+        for normal in [Some(axis * 1.0_f64.copysign(along)), across].into_iter().flatten() {
+            let own = exit(normal);
+            if own.1 < shortest.1 {
+                shortest = own;
+            }
+        }
+    }
+    shortest
 }
 
 #[cfg(test)]

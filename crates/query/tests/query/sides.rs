@@ -111,7 +111,20 @@ fn contacts_with_balls_inside_a_shape_lead_out() {
             let normal = Vector::from(contact.normal);
             let centre: [f64; 3] = (Vector::from(contact.point) - normal * ball).into();
             let of_ball = Shape::Sphere { centre, radius: 0.0 };
-            inside += usize::from(shape.gap_to(&of_ball).unwrap().upper == 0.0);
+            let is_inside = shape.gap_to(&of_ball).unwrap().upper == 0.0;
+            inside += usize::from(is_inside);
+            let [x, y, z] = pose.inverse().apply(centre).map(f64::abs);
+            let shortest = match round % 3 {
+                0 => (0.3 - x).min(0.2 - y).min(0.1 - z),
+                1 => (0.2 - y).min(0.15 - x.hypot(z)),
+                _ => f64::INFINITY,
+            };
+            if is_inside && shortest.is_finite() {
+                assert!(
+                    (contact.depth - shortest - ball).abs() < 1e-9,
+                    "round {round}: {contact:?} of {shape:?}"
+                );
+            }
             let moved = shape.moved(&Pose::from_translation((normal * contact.depth).into())).unwrap();
             let left = moved.gap_to(&of_ball).unwrap().upper;
             assert!(left >= ball - 1e-9, "round {round}: {left} left of {contact:?} of {shape:?}");
