@@ -10,6 +10,10 @@ const SECTORS: u32 = 24;
 /// The bits of all sectors.
 const ROUND: i32 = (1 << SECTORS) - 1;
 
+/// The square of the least cosine of the angle between the tangent plane and the way to a point that counts:
+/// 76°. A point below, as on the other side of a board, shows no direction along the sheet.
+const STEEP_SQ: f32 = 0.06;
+
 /// The sectors of the tangent plane of a point with points that support it, as bits, in lanes.
 pub(crate) struct Taken<S: Simd>(i32x16<S>);
 
@@ -36,7 +40,8 @@ impl<S: Simd> Taken<S> {
         let quarter = simd.select_f32x16(y.simd_ge(0.0), -(share - 1.0), share + 3.0);
         let turn = quarter * (SECTORS as f32 / 4.0);
         let sector = simd.select_f32x16(turn.simd_lt(SECTORS as f32), turn, f32x16::splat(simd, 0.0));
-        let counts: mask32x16<S> = d_sq.simd_lt(support_radius * support_radius) & length.simd_gt(0.0);
+        let is_beside: mask32x16<S> = (x * x + y * y).simd_gt(d_sq * STEEP_SQ);
+        let counts = d_sq.simd_lt(support_radius * support_radius) & is_beside;
         self.0 |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
     }
 

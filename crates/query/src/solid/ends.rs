@@ -390,7 +390,8 @@ impl Sheet<'_> {
     fn past(&self, disc: &FlatDisc, way: &Way) -> Option<Place> {
         let depth = self.reach(disc, &way.out) - way.low;
         let point = disc.centre + disc.rim(&way.out);
-        (depth >= -self.elements.margin).then_some(Place { point, normal: way.out, depth })
+        let least = -self.elements.margin.max(disc.thickness());
+        (depth >= least).then_some(Place { point, normal: way.out, depth })
     }
 
     /// The place of a shape whose core is before the end of the sheet, at a disc: along the way between their

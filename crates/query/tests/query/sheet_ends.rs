@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
-use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_query::{CollideOptions, Placed, Scratch, Shape, ShapeContact, ShapePlan, Target};
 use nearmiss_testdata::arbitrary::{rng, rotation};
 use rand::RngExt;
@@ -318,5 +318,42 @@ fn the_far_side_of_a_thin_body_is_no_way_out() {
         );
         let first = contacts.first().expect("a contact");
         assert!(first.normal[2] > 0.9 && (first.depth - depth).abs() < 0.01, "{thickness}: {contacts:?}");
+    }
+}
+
+/// A box beside a board that was scanned from both sides moves out past the end of the board. Each side is a
+/// sheet of its own, or the board is so thin that its points are balls.
+#[test]
+fn boxes_move_out_past_the_end_of_a_board() {
+    const LAST: i32 = 30;
+    let end = f64::from(LAST) * SPACING;
+    for thickness in [1.5, 2.0, 2.4, 3.0, 4.0] {
+        let mut points = Vec::new();
+        for (i, j) in (0..=LAST).flat_map(|i| (0..=LAST).map(move |j| (i, j))) {
+            let [x, y] = [i, j].map(|n| f64::from(n) * SPACING);
+            points.extend([[x, y, 0.0], [x, y, -thickness * SPACING]]);
+        }
+        let cloud = PointCloud::from_positions(&points).unwrap();
+        let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+        let placed = Placed::new(&scan, &Pose::IDENTITY);
+        // Below the end of one side are the points of the other one.
+        for i in (0..scan.len()).filter(|&i| scan.kind(i) == PointKind::Sheet) {
+            let [x, y, _] = placed.point(i);
+            let is_outermost = [x, y].iter().any(|c| c.min(end - c) < 0.5 * SPACING);
+            assert_eq!(scan.is_at_border(i), is_outermost && thickness > 2.5, "{thickness}: {x}, {y}");
+        }
+        let plan = ShapePlan::new(&CollideOptions::estimated(), &scan).unwrap();
+        let (target, rng) = (Target::new(placed, &plan), &mut rng(3));
+        let (mut contacts, mut scratch, mut deeper) = (Vec::new(), Scratch::default(), 0);
+        for _ in 0..300 {
+            let half = [0.2, 0.2, 0.4].map(|most| rng.random_range(0.5 * most..most));
+            let [overlap, off] = [rng.random_range(0.02..0.06), rng.random_range(-0.05..0.05)];
+            let middle = -0.5 * thickness * SPACING + off;
+            let pose = Pose::from_translation([end + half[0] - overlap, rng.random_range(0.4..1.1), middle]);
+            target.contacts(&Shape::Box { pose, half, radius: 0.0 }, &mut contacts, &mut scratch);
+            assert!(contacts[0].depth >= overlap, "{thickness}: {overlap}, {contacts:?}");
+            deeper += usize::from(contacts[0].depth > overlap + SPACING);
+        }
+        assert_eq!(deeper, 0, "{thickness}: of 300, more than a spacing deeper");
     }
 }
