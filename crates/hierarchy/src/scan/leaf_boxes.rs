@@ -55,7 +55,8 @@ impl LeafBoxes {
     }
 
     /// Returns where a search for all leaves within `core` + `reach` of `place` starts, if the body is within
-    /// `core` of it. `None` if that exceeds about four sampling radii: then it starts at the root. O(1).
+    /// `core` of it. `None` if that exceeds about four sampling radii, or if too many leaves are there: then
+    /// the search starts at the root. O(1).
     #[inline]
     #[must_use]
     pub fn near(&self, place: [f64; 3], core: f64, reach: f64) -> Option<BoxStarts<'_>> {

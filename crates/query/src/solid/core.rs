@@ -316,7 +316,7 @@ impl<'a> Solid<'a> {
 
     /// More than the rounding error of a point of the core that is nearest to `x`, if `x` is in the core.
     pub(crate) fn rounding(&self, x: &Vector) -> f64 {
-        1e-12 * (self.half.norm() + self.radius) + 4e-16 * x.amax()
+        1e-12 * (self.half.norm() + self.radius) + 2e-15 * x.amax()
     }
 
     /// The depth of `x` in the shape: a lower bound of its distance from the boundary, and the direction away

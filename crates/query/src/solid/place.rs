@@ -14,6 +14,9 @@ type Vector = Vector3<f64>;
 /// The precision of a distance, in disc radii.
 pub(crate) const PRECISION: f64 = 1e-3;
 
+/// Shorter vectors have no exact length.
+const LEAST: f64 = 1e-150;
+
 /// A place where a shape touches the surface.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
@@ -153,13 +156,13 @@ fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Opt
 fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
     let to = solid.inside - place;
     let exit = |normal: Vector| (normal, -normal.dot(&(solid.support(&-normal) - place)));
-    let mut shortest = exit(to.try_normalize(0.0).unwrap_or_else(Vector::z));
+    let mut shortest = exit(to.try_normalize(LEAST).unwrap_or_else(Vector::z));
     if solid.is_point() {
         return shortest;
     }
     for axis in solid.axes {
         let along = axis.dot(&to);
-        let across = (to - axis * along).try_normalize(0.0);
+        let across = (to - axis * along).try_normalize(LEAST);
         for normal in [Some(axis * 1.0_f64.copysign(along)), across].into_iter().flatten() {
             let own = exit(normal);
             if own.1 < shortest.1 {
@@ -173,11 +176,35 @@ fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
 #[cfg(test)]
 mod tests {
     use nearmiss_geometry::Pose;
-    use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
     use rand::RngExt;
 
     use super::*;
     use crate::solid::shape::Shape;
+
+    /// A shape far from the origin leaves a ball whose centre is in its core.
+    #[test]
+    fn small_cores_lead_out_far_from_the_origin() {
+        let rng = &mut rng(7363);
+        for round in 0..20_000 {
+            let far = [1030.0, -1e5, 3e7][round % 3];
+            let pose = rotation(rng).with_translation([far; 3]);
+            let half = [0.05, 0.04, 0.03].map(|half| half * far.abs() * [1e-3, 1e-6, 1e-9][round / 6 % 3]);
+            let shape = match round % 2 {
+                0 => Shape::Box { pose, half, radius: 0.0 },
+                _ => Shape::Cylinder { pose, half_height: half[0], radius: half[1], rounding: 0.0 },
+            };
+            let solid = Solid::new(&shape, &Pose::IDENTITY).unwrap();
+            let centre = Vector::from(pose.apply(point_in(rng, 0.9 * half[2])));
+            let way = solid.nearest(&centre) - centre;
+            assert!(way.norm() <= solid.rounding(&centre), "round {round}: {way:?} {shape:?}");
+            let (normal, inside) = way_out(&solid, &centre);
+            assert!(
+                (normal.norm() - 1.0).abs() < 1e-12 && inside > 0.0,
+                "round {round}: {normal:?} {inside}"
+            );
+        }
+    }
 
     /// A capsule has a place over a disc if it is near the disc, and not if it is wholly behind it.
     #[test]

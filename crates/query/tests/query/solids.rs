@@ -389,9 +389,10 @@ fn an_index_changes_no_verdict() {
             let what = format!("{kind:?}, round {round}, {shape:?}");
             seen[usize::from(touching)] += 1;
             assert_eq!((indexed.0, indexed.1, indexed.3), (touching, evidence, depth), "{what}");
-            // Lower bounds are rounded in another way.
+            // The boxes of the index may show a greater lower bound.
             let [[low, high], own] = [distance, indexed.2].map(|it| it.unwrap_or([9e9; 2]));
-            assert!((low - own[0]).abs() <= 1e-4 * r && high == own[1], "{what}: {distance:?}, {own:?}");
+            let is_bound = own[0] >= low - 1e-4 * r && own[0] <= high;
+            assert!(is_bound && high == own[1], "{what}: {distance:?}, {own:?}");
         }
     }
     assert!(seen.iter().all(|&n| n > 100), "both answers: {seen:?}");
