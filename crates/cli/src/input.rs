@@ -336,6 +336,10 @@ impl TextLines {
             ("standard input".into(), None, Box::new(std::io::stdin()))
         } else {
             check_there(path)?;
+            if path.is_dir() {
+                let what = "expected a text file, got a folder; name a file, or `-` for standard input";
+                return Err(CliError::UnsuitableFile { path: path.to_owned(), what: what.into() });
+            }
             let file = File::open(path).map_err(CliError::reading(path))?;
             let length = file.metadata().ok().filter(|about| about.is_file()).map(|about| about.len());
             (path.to_owned(), length, Box::new(file))

@@ -56,6 +56,15 @@ fn prepared_files_are_refused_when_anything_is_off() {
     let mut names: Vec<String> =
         ["cut", "head", "none", "longer", "text", "zeros"].map(|n| format!("{n}.nm")).into();
     place.write("at.txt", "0 0 0");
+    std::fs::create_dir(place.path("lines")).unwrap();
+    for question in [
+        &["touch", "ball.nm", "--surface", "--shapes", "lines"][..],
+        &["cast", "ball.nm", "--rays", "lines"],
+        &["collide", "ball.nm", "ball.nm", "--poses", "lines"],
+        &["eval", "ball.nm", "--points", "lines"],
+    ] {
+        place.refused(1, question, &["lines: expected a text file, got a folder; name a file"]);
+    }
     for file in &names {
         let file = file.as_str();
         place.refused(1, &["inspect", file], &[file]);
