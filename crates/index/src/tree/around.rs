@@ -2,13 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use fearless_simd::{Level, Simd, dispatch, f32x16};
+use fearless_simd::{Level, Simd, dispatch};
 
-use super::Boxes;
 use super::bodies::BoxBody;
-use super::cut::BoxTree;
+use super::cut::{BoxSearch, BoxTree};
 use super::starts::BoxStarts;
-use super::walk::{CutBoxVisitor, NearWalker, Stack};
+use super::walk::{CutBoxVisitor, Stack};
 
 impl BoxTree {
     /// Visits the boxes near a body, the nearest ones of a group first, until `visitor` ends the search.
@@ -29,40 +28,12 @@ impl BoxTree {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || {
-                let (mut search, mut stack) = (Near { tree: self, body, visitor }, Stack::new());
+                let (mut search, mut stack) = (BoxSearch { tree: self, query: body, visitor }, Stack::new());
                 let root = if starts.is_none() { Some(self.groups().root()) } else { None };
                 let top = starts.map_or(0, |starts| stack.put(starts.all()));
                 self.groups().walk_on(simd, root, (&mut stack, top), &mut search)
             },
         ))
-    }
-}
-
-struct Near<'a, V> {
-    tree: &'a BoxTree,
-    body: &'a BoxBody,
-    visitor: &'a mut V,
-}
-
-impl<S: Simd, V: CutBoxVisitor> NearWalker<S> for Near<'_, V> {
-    #[inline(always)]
-    fn distances_sq(&self, simd: S, group: (usize, usize), boxes: &Boxes) -> f32x16<S> {
-        self.tree.distances_sq(simd, self.body, (group, boxes), self.visitor.most_sq())
-    }
-
-    #[inline(always)]
-    fn most_sq(&self) -> f32 {
-        self.visitor.most_sq()
-    }
-
-    #[inline(always)]
-    fn foresee(&self, id: usize) {
-        self.visitor.foresee(self.tree.numbers[id] as usize);
-    }
-
-    #[inline(always)]
-    fn block(&mut self, simd: S, id: usize, least_sq: f32) -> ControlFlow<()> {
-        self.visitor.visit(simd, self.tree.numbers[id] as usize, least_sq)
     }
 }
 

@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::wide::{along, load};
 
-use super::cut::{BoxTree, Slabs};
+use super::cut::{BoxQuery, BoxTree, Slabs};
 use super::{Bounds, Boxes};
 
 /// A point, a segment or a box that boxes are compared with.
@@ -81,30 +81,29 @@ impl<S: Simd> Apart<S> {
     }
 }
 
-impl BoxTree {
-    /// Lower bounds on the squared distances of the boxes of a group, by its level and number. Beyond
-    /// `most_sq` they may be less close.
+impl BoxQuery for BoxBody {
+    /// Lower bounds on the squared distances of the boxes. Beyond `most_sq` they may be less close.
     #[inline(always)]
-    pub(super) fn distances_sq<S: Simd>(
+    fn distances_sq<S: Simd>(
         &self,
         simd: S,
-        body: &BoxBody,
+        tree: &BoxTree,
         ((level, group), boxes): ((usize, usize), &Boxes),
         most_sq: f32,
     ) -> f32x16<S> {
-        let upright = boxes.distances_sq(simd, &body.bounds);
+        let upright = boxes.distances_sq(simd, &self.bounds);
         if level > 0 {
             return upright;
         }
         let zero = f32x16::splat(simd, 0.0);
         let mut apart = Apart { sum: zero, along: [zero; 3], reach: [zero; 3] };
-        for slabs in &self.slabs[group] {
+        for slabs in &tree.slabs[group] {
             let near: mask32x16<S> = upright.max(apart.sum).simd_le(most_sq);
             if near.all_false() {
                 return upright.max(apart.sum);
             }
-            apart.add(simd, slabs, body);
+            apart.add(simd, slabs, self);
         }
-        upright.max(apart.sum).max(apart.along_axes(simd, body))
+        upright.max(apart.sum).max(apart.along_axes(simd, self))
     }
 }

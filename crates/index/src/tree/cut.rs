@@ -1,11 +1,13 @@
 //! A tree of upright boxes that slabs cut, sixteen to a group.
 
-use fearless_simd::Level;
+use std::ops::ControlFlow;
+
+use fearless_simd::{Level, Simd, f32x16};
 use nearmiss_lanes::parallel::{both, map};
 use nearmiss_lanes::wide::WIDTH;
 use nearmiss_store::Room;
 
-use super::walk::Groups;
+use super::walk::{CutBoxVisitor, Groups, NearWalker};
 use super::{Boxes, fill_above, levels};
 
 /// The number of slabs that cut a box.
@@ -157,6 +159,48 @@ fn halve(places: &mut [([f32; 3], u32)], below: usize) {
     both(|| halve(left, below), || halve(right, below));
 }
 
+/// A ray or a body that the boxes of a tree are compared with.
+pub(super) trait BoxQuery {
+    /// Returns the squared distances of the boxes of a group, by its level and number, of which those beyond
+    /// `most_sq` are skipped.
+    fn distances_sq<S: Simd>(
+        &self,
+        simd: S,
+        tree: &BoxTree,
+        group: ((usize, usize), &Boxes),
+        most_sq: f32,
+    ) -> f32x16<S>;
+}
+
+/// A search for the boxes of a tree near a ray or a body.
+pub(super) struct BoxSearch<'a, Q, V> {
+    pub(super) tree: &'a BoxTree,
+    pub(super) query: &'a Q,
+    pub(super) visitor: &'a mut V,
+}
+
+impl<S: Simd, Q: BoxQuery, V: CutBoxVisitor> NearWalker<S> for BoxSearch<'_, Q, V> {
+    #[inline(always)]
+    fn distances_sq(&self, simd: S, group: (usize, usize), boxes: &Boxes) -> f32x16<S> {
+        self.query.distances_sq(simd, self.tree, (group, boxes), self.visitor.most_sq())
+    }
+
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.visitor.most_sq()
+    }
+
+    #[inline(always)]
+    fn foresee(&self, id: usize) {
+        self.visitor.foresee(self.tree.numbers[id] as usize);
+    }
+
+    #[inline(always)]
+    fn block(&mut self, simd: S, id: usize, least_sq: f32) -> ControlFlow<()> {
+        self.visitor.visit(simd, self.tree.numbers[id] as usize, least_sq)
+    }
+}
+
 #[cfg(test)]
 pub(super) mod samples {
     use nearmiss_geometry::Pose;
@@ -205,18 +249,9 @@ pub(super) mod samples {
 
         fn foresee(&self, _: usize) {}
 
-        fn visit<S: fearless_simd::Simd>(
-            &mut self,
-            _: S,
-            number: usize,
-            _: f32,
-        ) -> std::ops::ControlFlow<()> {
+        fn visit<S: Simd>(&mut self, _: S, number: usize, _: f32) -> ControlFlow<()> {
             self.numbers.push(number);
-            if self.last == Some(number) {
-                std::ops::ControlFlow::Break(())
-            } else {
-                std::ops::ControlFlow::Continue(())
-            }
+            if self.last == Some(number) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         }
     }
 }

@@ -7,8 +7,8 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_lanes::wide::{along, load};
 
 use super::Boxes;
-use super::cut::{BoxTree, Slabs};
-use super::walk::{CutBoxVisitor, NearWalker, Stack};
+use super::cut::{BoxQuery, BoxSearch, BoxTree, Slabs};
+use super::walk::{CutBoxVisitor, Stack};
 
 /// The least component of a direction by which lengths are divided.
 const LEAST: f32 = 1e-12;
@@ -94,51 +94,36 @@ impl BoxTree {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || {
-                let mut search = Along { tree: self, ray, visitor };
+                let mut search = BoxSearch { tree: self, query: ray, visitor };
                 self.groups().walk_near(simd, self.groups().root(), &mut Stack::new(), &mut search)
             },
         ))
     }
 }
 
-struct Along<'a, V> {
-    tree: &'a BoxTree,
-    ray: &'a BoxRay,
-    visitor: &'a mut V,
-}
-
-impl<S: Simd, V: CutBoxVisitor> NearWalker<S> for Along<'_, V> {
+impl BoxQuery for BoxRay {
     /// The squared distances along the ray at which it enters the boxes; infinite where it passes beside.
     #[inline(always)]
-    fn distances_sq(&self, simd: S, (level, group): (usize, usize), boxes: &Boxes) -> f32x16<S> {
-        let mut stretches = boxes.stretches(simd, self.ray);
+    fn distances_sq<S: Simd>(
+        &self,
+        simd: S,
+        tree: &BoxTree,
+        ((level, group), boxes): ((usize, usize), &Boxes),
+        _: f32,
+    ) -> f32x16<S> {
+        let mut stretches = boxes.stretches(simd, self);
         let mut passes: mask32x16<S> = stretches[0].simd_le(stretches[1]);
         if level == 0 {
-            for slabs in &self.tree.slabs[group] {
+            for slabs in &tree.slabs[group] {
                 if passes.all_false() {
                     break;
                 }
-                stretches = slabs.cut(simd, self.ray, stretches);
+                stretches = slabs.cut(simd, self, stretches);
                 passes = stretches[0].simd_le(stretches[1]);
             }
         }
         let [enter, _] = stretches;
         passes.select(enter * enter, f32x16::splat(simd, f32::INFINITY))
-    }
-
-    #[inline(always)]
-    fn most_sq(&self) -> f32 {
-        self.visitor.most_sq()
-    }
-
-    #[inline(always)]
-    fn foresee(&self, id: usize) {
-        self.visitor.foresee(self.tree.numbers[id] as usize);
-    }
-
-    #[inline(always)]
-    fn block(&mut self, simd: S, id: usize, least_sq: f32) -> ControlFlow<()> {
-        self.visitor.visit(simd, self.tree.numbers[id] as usize, least_sq)
     }
 }
 

@@ -10,7 +10,7 @@ use nearmiss_lanes::wide::WIDTH;
 
 use super::Boxes;
 use super::bodies::BoxBody;
-use super::cut::BoxTree;
+use super::cut::{BoxQuery, BoxTree};
 use super::walk::{NearWalker, Stack};
 use crate::cubes::Cubes;
 
@@ -176,7 +176,7 @@ struct Listing<'s> {
 impl<S: Simd> NearWalker<S> for Listing<'_> {
     #[inline(always)]
     fn distances_sq(&self, simd: S, group: (usize, usize), boxes: &Boxes) -> f32x16<S> {
-        self.tree.distances_sq(simd, &self.body, (group, boxes), self.most_sq)
+        self.body.distances_sq(simd, self.tree, (group, boxes), self.most_sq)
     }
 
     #[inline(always)]
