@@ -151,8 +151,9 @@ fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Opt
 }
 
 /// A direction in which the core moves away from a place in it, and the distance after which the place is
-/// outside: the shortest of those along the axes of the box about the core, across each of these axes, and to
-/// the inside of the shape. The shortest of all for boxes and cylinders.
+/// outside. It is the shortest of those along the axes of the box about the core, across each of these axes,
+/// to the inside of the shape, across the side of a cone, and across the nearest face of other shapes. It is
+/// the shortest of all, for hulls and shapes of the caller's own up to the precision of [`Solid::depth`].
 fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
     let to = solid.inside - place;
     let exit = |normal: Vector| (normal, -normal.dot(&(solid.support(&-normal) - place)));
@@ -160,15 +161,26 @@ fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
     if solid.is_point() {
         return shortest;
     }
-    for axis in solid.axes {
-        let along = axis.dot(&to);
-        let across = (to - axis * along).try_normalize(LEAST);
-        for normal in [Some(axis * 1.0_f64.copysign(along)), across].into_iter().flatten() {
-            let own = exit(normal);
-            if own.1 < shortest.1 {
-                shortest = own;
-            }
+    let mut offer = |normal: Vector| {
+        let own = exit(normal);
+        if own.1 < shortest.1 {
+            shortest = own;
         }
+    };
+    for (k, axis) in solid.axes.into_iter().enumerate() {
+        let along = axis.dot(&to);
+        offer(axis * 1.0_f64.copysign(along));
+        let Some(across) = (to - axis * along).try_normalize(LEAST) else { continue };
+        offer(across);
+        if let Some([below, above]) = solid.round_ends().filter(|_| k == 1) {
+            let side = across * (2.0 * solid.half.y) + axis * (above - below);
+            offer(side.try_normalize(LEAST).unwrap_or(across));
+        }
+    }
+    if !solid.has_projection()
+        && let Some(inwards) = solid.depth(place).and_then(|(_, inwards)| inwards.try_normalize(LEAST))
+    {
+        offer(inwards);
     }
     shortest
 }

@@ -36,14 +36,6 @@ pub(crate) enum Probed<'a> {
     Open(Option<(&'a ClearanceGrid, Clearance<'a>)>),
 }
 
-/// Returns `true` if the grid tells at the centre of a shape that no disc or ball is within the margin.
-#[inline]
-pub(crate) fn is_far(elements: &Elements<'_>, solid: &Solid<'_>) -> bool {
-    let within = elements.margin + solid.radius + solid.half.norm();
-    let told = elements.clear.map(|grid| grid.at(&elements.arrays, solid.centre.into(), within));
-    told.is_some_and(|at| at.discs > within)
-}
-
 /// The answer of the grid about the centre of a shape.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct About<'a> {
