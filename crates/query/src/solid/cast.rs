@@ -18,9 +18,12 @@ use nearmiss_surface::Status;
 
 use crate::ask::answer::Evidence;
 use crate::ask::options::{Detail, Semantics};
+use crate::leaf::disc_triangle::FlatDisc;
 use crate::pair::placed::ViewScratch;
+use crate::solid::core::Solid;
 use crate::solid::crossing::{Crossing, enters, meets, passes_cell};
 use crate::solid::elements::{Element, Elements};
+use crate::solid::meeting::verified_in;
 use crate::solid::ray::{RayHit, StoredRay};
 use crate::solid::ray_lanes::{LEAST_SPEED, LaneRay};
 
@@ -28,6 +31,13 @@ type Vector = Vector3<f64>;
 
 /// Rounding of places, relative to all coordinates.
 const ROUNDING: f64 = 8e-6;
+
+/// Rounding of a place along a ray in double precision, relative to the origin.
+const FAR_ROUNDING: f64 = 1e-15;
+
+/// Rounding of places along a ray, in sampling radii, from which on nothing is proven, and from which on
+/// the ray is not compared.
+const FAR_LOST: [f64; 2] = [1e-3, 0.1];
 
 /// The greatest |f| on the surface, in bandwidths.
 const ON_SURFACE: f64 = 1e-6;
@@ -84,13 +94,21 @@ pub(crate) fn crossings(
     let size = size + elements.beyond_boxes() + ray.radius;
     let middle = (centre - ray.origin).dot(&ray.direction);
     let off = (centre - ray.at(middle)).norm();
-    if off.is_nan() || off > size * 1.001 || middle + size < 0.0 || middle - size * 1.001 > ray.max {
-        return elements.of_separation(false);
+    // By how much double precision may miss a place along the ray.
+    let lost = FAR_ROUNDING * (ray.origin.amax() + middle.abs());
+    let spacing = f64::from(elements.arrays.sampling_radius);
+    if off.is_nan() || lost > FAR_LOST[1] * spacing {
+        return Evidence::Estimated;
+    }
+    if off > size * 1.001 || middle + size < 0.0 || middle - size * 1.001 > ray.max {
+        return elements.of_separation(lost > FAR_LOST[0] * spacing);
     }
     let skipped = (middle - 1.01 * size).max(0.0);
     #[expect(clippy::cast_possible_truncation, reason = "counted in `thick`")]
-    let (single, slack) =
-        (|v: Vector| [v.x as f32, v.y as f32, v.z as f32], (ROUNDING * (elements.far + 2.0 * size)) as f32);
+    let (single, slack) = (
+        |v: Vector| [v.x as f32, v.y as f32, v.z as f32],
+        (ROUNDING * (elements.far + 2.0 * size) + lost) as f32,
+    );
     #[expect(clippy::cast_possible_truncation, reason = "counted in `thick`")]
     let thick = (ray.radius + elements.beyond_boxes()) as f32 + slack;
     #[expect(clippy::cast_possible_truncation, reason = "those near the ends are compared again")]
@@ -107,7 +125,7 @@ pub(crate) fn crossings(
         most_sq: f32::INFINITY,
         end: f64::INFINITY,
         found,
-        is_doubtful: elements.of_separation(false) == Evidence::Estimated,
+        is_doubtful: elements.of_separation(lost > FAR_LOST[0] * spacing) == Evidence::Estimated,
     };
     search.limit(ray.max);
     // Ends early if any hit will do.
@@ -159,11 +177,27 @@ pub(crate) fn next_hit(
             return hit(elements, ray, first, scratch).map(|hit| (hit, 0.0));
         }
         let layer = first.layer(elements);
-        let is_same = |it: &&Crossing| it.t - first.t <= layer;
+        // As far as a search for the first hit looks.
+        let mut end = first.t + layer;
+        let is_same = |it: &&Crossing| {
+            let is_same = it.t <= end;
+            if is_same && it.is_sure() {
+                end = end.min(it.t + it.layer(elements));
+            }
+            is_same
+        };
         let count = all[start..].iter().take_while(is_same).count();
         *next += count;
-        let sheet = || all[start..start + count].iter().filter(|it| elements.is_disc(it.i));
-        let Some(best) = sheet().min_by(|a, b| a.beside.total_cmp(&b.beside)) else { continue };
+        // A ball that touches before it moves has a hit there, wherever it touches next.
+        let starts = ray.radius > 0.0 && first.t == 0.0;
+        let counts = |it: &&Crossing| elements.is_disc(it.i) && (!starts || it.t == 0.0);
+        let sheet = || all[start..start + count].iter().filter(counts);
+        // At the start the nearest point may be in the ball, which certifies the hit.
+        let rank = |it: &Crossing| match starts {
+            true => (elements.position(it.i) - ray.origin).norm_squared(),
+            false => it.beside,
+        };
+        let Some(best) = sheet().min_by(|a, b| rank(a).total_cmp(&rank(b))) else { continue };
         let found = hit(elements, ray, best, scratch);
         // In a hole, the point nearest to the ray may be another one.
         let found = found.or_else(|| sheet().find_map(|it| hit(elements, ray, it, scratch)));
@@ -205,10 +239,20 @@ fn hit(
     // The crossing may be known in single precision only.
     let cell = f64::from(elements.arrays.cell_radius(i)).max(disc.radius);
     let Crossing { t, beside, .. } = meets(ray, &disc, i, cell).unwrap_or(*crossing);
+    if t == 0.0 && ray.radius > 0.0 && beside <= 1.0 {
+        let (point, normal, evidence) = at_start(elements, ray, (i, &disc), scratch);
+        return Some(told(t, point, normal, evidence));
+    }
     let x = ray.at(t);
     let towards = disc.normal * 1.0_f64.copysign(-disc.normal.dot(&ray.direction));
     let side = |normal: Vector| {
-        if placed.scan().is_oriented() && normal.dot(&disc.normal) < 0.0 { -normal } else { normal }
+        // A ball may touch the flank of a bend that it moves along.
+        let right = match placed.scan().is_oriented() {
+            true => disc.normal,
+            false if ray.radius > 0.0 => towards,
+            false => -ray.direction,
+        };
+        if normal.dot(&right) < 0.0 { -normal } else { normal }
     };
     let is_wanted = elements.detail == Detail::Witness && placed.verifies();
     if is_wanted
@@ -230,6 +274,30 @@ fn hit(
     let is_inner = placed.scan().kind(i) == PointKind::Sheet;
     let is_part = is_inner && placed.scan().nearest_point_near(i, place.into()) as usize == i;
     is_part.then(|| told(t, place, side(towards), Evidence::Estimated))
+}
+
+/// The contact of a ball that touches a disc before it moves: the point, the normal and the evidence. The
+/// normal is outwards if the scan is oriented, otherwise on the side of the ball's centre.
+fn at_start(
+    elements: &Elements<'_>,
+    ray: &StoredRay,
+    (i, disc): (usize, &FlatDisc),
+    scratch: &mut ViewScratch,
+) -> (Vector, Vector, Evidence) {
+    let on_disc = disc.nearest(&ray.origin);
+    let height = disc.normal.dot(&(ray.origin - disc.centre));
+    let side = if height == 0.0 { -disc.normal.dot(&ray.direction) } else { height };
+    let is_turned = !elements.placed.scan().is_oriented() && side < 0.0;
+    let normal = if is_turned { -disc.normal } else { disc.normal };
+    let verified = Solid::ball((ray.origin, ray.radius)).and_then(|ball| {
+        elements.held(&ball, i).or_else(|| {
+            let is_wanted = elements.detail == Detail::Witness;
+            let found = is_wanted.then(|| verified_in(elements, &ball, (i, on_disc), scratch))??;
+            Some(elements.placed.stored_to_world().apply_inverse(found).into())
+        })
+    });
+    let evidence = if verified.is_some() { Evidence::Certified } else { Evidence::Estimated };
+    (verified.unwrap_or(on_disc), normal, evidence)
 }
 
 /// Looks for the place along a ray, near distance `t`, where it is its radius away from the surface

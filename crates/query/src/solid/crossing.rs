@@ -66,6 +66,11 @@ pub(crate) fn meets(ray: &StoredRay, disc: &FlatDisc, i: usize, cell: f64) -> Op
         let distance = way.norm();
         (distance - ray.radius, if distance > 0.0 { way.dot(&ray.direction) / distance } else { -1.0 })
     };
+    // As a shape at rest, the ball touches within the thickness of the disc.
+    if touches(0.0).0 <= disc.thickness() {
+        let beside = (disc.nearest(&ray.origin) - disc.centre).norm() / disc.radius;
+        return Some(Crossing { t: 0.0, i, beside: beside.min(1.0), cosine: cosine.abs() });
+    }
     let middle = (disc.centre - ray.origin).dot(&ray.direction);
     let mut t = (middle - disc.radius - ray.radius).max(0.0);
     // The distance is convex along the ray, so Newton's steps from before do not pass the first zero.

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::ask::answer::Evidence;
 
 /// A ray in world coordinates, or the path of a ball along one. A ray whose direction has no length,
-/// with a number that is NaN, or with a negative length hits nothing.
+/// with a number that is NaN, or with a negative length hits nothing. Neither does a ray from so far away
+/// that rounding moves it by a tenth of a sampling radius: some 10¹⁴ of these radii.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ray {
     /// The start.
@@ -48,7 +49,7 @@ pub struct RayHit {
     /// The place on the surface.
     pub point: [f64; 3],
     /// The unit normal there: outwards if the scan is oriented, otherwise to the side that the ray
-    /// comes from.
+    /// comes from. For a ball that touches before it moves, to the side of its centre.
     pub normal: [f64; 3],
     /// The measured point whose disc or ball is hit, as the caller numbered it.
     pub source: PointId,

@@ -2,9 +2,10 @@
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
-use nearmiss_hierarchy::{BuildOptions, PointHierarchy, SLAB};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy, SLAB, THICKNESS};
 use nearmiss_query::{
-    CollideOptions, Detail, Evidence, Placed, Ray, Scratch, Semantics, ShapeIndex, ShapePlan, Target,
+    CollideOptions, Detail, Evidence, Placed, Ray, Scratch, Semantics, Shape, ShapeIndex, ShapePlan,
+    ShapeVerdict, Target,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::instructions::levels;
@@ -36,6 +37,9 @@ fn first_touch(ray: &Ray, (centre, normal, radius): (Vector, Vector, f64)) -> Op
     let (mut low, mut high) =
         ((middle - 2.0 * radius - ray.radius).max(0.0), (middle + 2.0 * radius + ray.radius).max(0.0));
     let start = low;
+    if gap(0.0) <= f64::from(THICKNESS) * radius {
+        return Some(0.0);
+    }
     for _ in 0..200 {
         let third = (high - low) / 3.0;
         if gap(low + third) <= gap(high - third) {
@@ -255,4 +259,80 @@ fn odd_rays_hit_nothing() {
             "{ray:?}"
         );
     }
+}
+
+/// A ball that touches before it moves has its hit there, certified if it holds a measured point.
+#[test]
+fn balls_that_touch_do_not_move() {
+    let cloud = PointCloud::cleaned(&arbitrary::cloud(CloudKind::Sphere, 3000, 8)).unwrap();
+    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let index = ShapeIndex::new(&scan);
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+    let placed = Placed::new(&scan, &Pose::IDENTITY).with_shapes(&index);
+    let target = Target::new(placed, &plan);
+    let (rng, mut scratch, mut hits) = (&mut rng(611), Scratch::default(), Vec::new());
+    let (mut touching, mut holding, mut moving) = (0, 0, 0);
+    for round in 0..4000 {
+        let p = Vector::from(placed.point(rng.random_range(0..scan.len())));
+        let radius = rng.random_range(0.01..0.2);
+        let origin = p + Vector::from(point_in(rng, 1.2 * radius));
+        let ray = Ray::new(origin.into(), unit_vector(rng)).with_radius(radius);
+        let touch = target.touch(&Shape::Sphere { centre: ray.origin, radius }, &mut scratch).verdict;
+        let hit = target.cast(&ray, &mut scratch).hit;
+        target.cast_all(&ray, &mut hits, &mut scratch);
+        assert_eq!(hit.map(|hit| hit.t), hits.first().map(|hit| hit.t), "round {round}: {ray:?}");
+        let ShapeVerdict::Touching { .. } = touch else {
+            assert!(hit.is_none_or(|hit| hit.t > 0.0), "round {round}: {touch:?} {hit:?} {ray:?}");
+            moving += usize::from(hit.is_some());
+            continue;
+        };
+        touching += 1;
+        let hit = hit.expect("a hit where the ball touches");
+        assert!(hit.t == 0.0 && target.is_hit(&ray, &mut scratch), "round {round}: {hit:?} {ray:?}");
+        let holds = |i: usize| (Vector::from(placed.point(i)) - origin).norm() <= radius;
+        if (0..scan.len()).any(holds) {
+            holding += 1;
+            assert!(hit.evidence == Evidence::Certified, "round {round}: {touch:?} {hit:?}");
+        }
+        let away = (Vector::from(hit.point) - origin).norm();
+        assert!(away <= radius + 0.01, "round {round}: {away} of {radius}");
+    }
+    assert!(
+        touching > 1500 && holding > 1000 && moving > 200,
+        "{touching} touching, {holding} hold a point, {moving} move"
+    );
+}
+
+/// Hits of thin rays face the ray, and nothing is claimed about rays from too far away.
+#[test]
+fn normals_face_rays_and_far_rays_prove_nothing() {
+    let rng = &mut rng(613);
+    let rough: Vec<[f64; 3]> =
+        (0..3000).map(|_| unit_vector(rng).map(|x| x * rng.random_range(0.97..1.03))).collect();
+    let cloud = PointCloud::from_positions(&rough).unwrap();
+    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let index = ShapeIndex::new(&scan);
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+    let target = Target::new(Placed::new(&scan, &Pose::IDENTITY).with_shapes(&index), &plan);
+    let (mut scratch, mut hits) = (Scratch::default(), 0);
+    for round in 0..20_000 {
+        let origin = Vector::from(point_in(rng, 2.0));
+        let direction = Vector::from(unit_vector(rng));
+        let Some(hit) = target.cast(&Ray::new(origin.into(), direction.into()), &mut scratch).hit else {
+            continue;
+        };
+        hits += 1;
+        let slope = Vector::from(hit.normal).dot(&direction);
+        assert!(slope <= 1e-9, "round {round}: {slope} {hit:?}");
+    }
+    assert!(hits > 2500, "{hits} hits");
+    for far in [1e15, 1e18, 1e300, f64::MAX] {
+        for radius in [0.0, 0.03] {
+            let ray = Ray::new([0.0, 0.0, far], [0.0, 0.0, -1.0]).with_radius(radius);
+            let answer = target.cast(&ray, &mut scratch);
+            assert!(answer.hit.is_none() && answer.evidence == Evidence::Estimated, "{far}: {answer:?}");
+        }
+    }
+    let near = target.cast(&Ray::new([0.0, 0.0, 1e6], [0.0, 0.0, -1.0]), &mut scratch).hit.expect("a hit");
+    assert!((near.t - 1e6 + 1.0).abs() < 0.1, "{near:?}");
 }
