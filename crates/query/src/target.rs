@@ -215,13 +215,27 @@ impl<'a> Target<'a> {
     /// ```
     #[must_use]
     pub fn sweep(&self, shape: &Shape<'_>, motion: &Motion, scratch: &mut Scratch) -> ShapeSweep {
+        self.sweep_within(shape, motion, &Budget::UNLIMITED, scratch)
+    }
+
+    /// Like [`Self::sweep`], with limits on the cost. When `budget` ends the search, what has been proven up
+    /// to then is told. A distance query counts as one unit of work; a contact that was found takes ten more
+    /// to tell its time.
+    #[must_use]
+    pub fn sweep_within(
+        &self,
+        shape: &Shape<'_>,
+        motion: &Motion,
+        budget: &Budget,
+        scratch: &mut Scratch,
+    ) -> ShapeSweep {
         if !self.is_proper {
             let verdict = ShapeSweepVerdict::Undecided { t_free: 0.0, reason: SweepReason::Pose };
             return ShapeSweep { verdict, distances: 0 };
         }
         let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
         let working = (level, &mut contact.gathers[0], &mut solid.candidates, &mut solid.contacts);
-        sweep(&self.elements, shape, motion, working)
+        sweep(&self.elements, shape, (motion, budget), working)
     }
 
     /// Bounds the penetration of a shape and the scan: how far the shape must at least be shifted, in any

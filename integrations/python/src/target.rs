@@ -266,12 +266,20 @@ impl Target {
     /// first impact.
     ///
     /// The shape moves through the poses `path`, of shape (N, 4, 4), by screws; pose k is reached at time k.
-    /// Returns a `SweepAnswer`, whose times count poses.
-    fn sweep(&self, shape: &Bound<'_, Shape>, path: &Bound<'_, PyAny>) -> PyResult<SweepAnswer> {
+    /// Returns a `SweepAnswer`, whose times count poses. Options are `work` (a distance query is one unit) and
+    /// `seconds`.
+    #[pyo3(signature = (shape, path, **options))]
+    fn sweep(
+        &self,
+        shape: &Bound<'_, Shape>,
+        path: &Bound<'_, PyAny>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<SweepAnswer> {
         let (py, convex, way) = (shape.py(), shape.get().convex(), motion(Some(path), Pose::from_matrix)?);
         let now = self.now(py)?;
+        let options = Options::new(options, OF_BUDGET, now.frame.metric())?;
         let band = now.target().scan().sampling_radius();
-        let answer = ask(py, |scratch| now.target().sweep(&convex, &way, scratch));
+        let answer = ask(py, |scratch| now.target().sweep_within(&convex, &way, &options.budget(), scratch));
         Ok(SweepAnswer(SweepRecord::of_shape(&answer, way.duration(), band)))
     }
 

@@ -19,7 +19,11 @@ pub(crate) fn sweep<C: Course>(
 ) -> SweepAnswer {
     let mut sweeping = Sweeping::new((course, motions), plan, budget, scratch);
     let undecided = |t_free, reason| SweepVerdict::Undecided { t_free, reason };
-    let verdict = if plan.proves() {
+    // The budget may end before the proof tells that they touch at the start.
+    let at_start = if plan.proves() && budget.may_end() { sweeping.contact_at_start() } else { None };
+    let verdict = if let Some(Hit { t_hit, contact, evidence }) = at_start {
+        SweepVerdict::Impact { t_free: 0.0, t_hit, contact, evidence }
+    } else if plan.proves() {
         match sweeping.prove() {
             Ok(()) => {
                 sweeping.tighten();
@@ -49,6 +53,14 @@ struct Hit {
 }
 
 impl<C: Course> Sweeping<'_, C> {
+    /// Returns the contact at the start, if there is one.
+    fn contact_at_start(&mut self) -> Option<Hit> {
+        let Verdict::Intersecting { contact, evidence } = self.touches(&self.screws(0), 0.0).verdict else {
+            return None;
+        };
+        Some(Hit { t_hit: 0.0, contact, evidence })
+    }
+
     /// Returns the first contact that is found from `time` on.
     fn first_contact(&mut self, time: f64) -> Result<Hit, SweepReason> {
         let duration = self.duration();

@@ -6,6 +6,7 @@ use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Aabb, Motion, Pose, Screw};
 
+use crate::ask::budget::Budget;
 use crate::motion::answer::{ShapeSweep, ShapeSweepVerdict, SweepReason};
 use crate::motion::step::least_step;
 use crate::pair::placed::ViewScratch;
@@ -50,6 +51,7 @@ struct Course<'s, 'a> {
     ball: (Vector, f64),
     /// The clearance in the world.
     clearance: f64,
+    budget: &'s Budget,
     level: Level,
     scratch: &'s mut ViewScratch,
     distances: u32,
@@ -59,7 +61,7 @@ struct Course<'s, 'a> {
 pub(crate) fn sweep(
     elements: &Elements<'_>,
     shape: &Shape<'_>,
-    motion: &Motion,
+    (motion, budget): (&Motion, &Budget),
     (level, scratch, candidates, found): Working<'_>,
 ) -> ShapeSweep {
     let clearance = elements.margin * elements.scale();
@@ -69,7 +71,8 @@ pub(crate) fn sweep(
     };
     let (min, max) = (Vector::from(min), Vector::from(max));
     let ball = (0.5 * (min + max), 0.5 * (max - min).norm());
-    let mut course = Course { elements, shape, motion, ball, clearance, level, scratch, distances: 0 };
+    let mut course =
+        Course { elements, shape, motion, ball, clearance, budget, level, scratch, distances: 0 };
     let verdict = match course.run() {
         Outcome::Told(verdict) => verdict,
         Outcome::Hit { t_free, apart, t_hit } => {
@@ -201,7 +204,8 @@ impl<'s> Course<'s, '_> {
             let next = time + way / speed;
             // What is left of the proof may reach the end of the motion.
             goes_on &= proven >= duration || !is_near && (next > time || speed == 0.0);
-            if self.distances >= MOST {
+            let distances = self.distances;
+            if distances >= MOST || self.budget.go_on(distances.into()).is_break() {
                 (reason, goes_on) = (SweepReason::Budget, false);
                 break;
             }

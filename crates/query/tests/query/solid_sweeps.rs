@@ -4,7 +4,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Motion, PointCloud, Pose, Screw};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    CollideOptions, Placed, Scratch, Shape, ShapePlan, ShapeSweepVerdict, SupportMap, SweepReason, Target,
+    Budget, CollideOptions, Placed, Scratch, Shape, ShapePlan, ShapeSweepVerdict, SupportMap, SweepReason,
+    Target,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::shapes::{self, Order, Sampling};
@@ -242,6 +243,35 @@ fn shapes_that_do_not_move_or_start_in_contact_are_told() {
     let along = Motion::through(&[at(-0.9), at(0.9)]).unwrap();
     let verdict = told(&ball, &along);
     assert!(!matches!(verdict, ShapeSweepVerdict::Impact { .. }), "{verdict:?}");
+}
+
+/// A limit of work ends a sweep with what the first queries prove.
+#[test]
+fn budgets_end_a_sweep_of_a_shape_with_what_is_proven() {
+    let sampled =
+        shapes::torus(1.0, 0.4).sample(Sampling { spacing: 0.05, noise: 0.0, order: Order::Random, seed: 2 });
+    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
+    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
+    let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+    let (ball, scratch) = (Shape::Sphere { centre: [0.0; 3], radius: 0.2 }, &mut Scratch::default());
+    let at = |x: f64| Pose::from_translation([x, 0.1, 0.0]);
+    let motion = Motion::through(&[at(4.0), at(2.5), at(0.0)]).unwrap();
+    let whole = target.sweep(&ball, &motion, scratch);
+    let ShapeSweepVerdict::Impact { t_hit, .. } = whole.verdict else { panic!("{whole:?}") };
+    let mut last = 0.0;
+    for work in 1..=u64::from(whole.distances) {
+        let answer = target.sweep_within(&ball, &motion, &Budget::UNLIMITED.with_work(work), scratch);
+        let ShapeSweepVerdict::Undecided { t_free, reason: SweepReason::Budget } = answer.verdict else {
+            assert_eq!(answer, whole, "{work} queries suffice");
+            assert!(last > 0.8 * t_hit, "{last} was proven before");
+            return;
+        };
+        assert_eq!(u64::from(answer.distances), work);
+        assert!(t_free >= last && t_free < t_hit, "{work} queries: {answer:?}");
+        last = t_free;
+    }
+    panic!("no budget suffices: {whole:?}");
 }
 
 #[test]

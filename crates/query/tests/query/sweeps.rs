@@ -387,6 +387,11 @@ fn budgets_end_a_sweep_with_what_is_proven() {
         }
     }
     assert!((2..8).contains(&cut) && last > 0.0, "{cut} sweeps were cut, the last at {last}");
+    // A contact at the start is found first. Its proof of contact alone takes some 50 units.
+    let touching = through(&[at(1.2, 0.0, 0.0), at(-3.0, 0.2, 0.0)]);
+    let answer =
+        Question::new(&a, &b, [&still, &touching]).within(&Budget::UNLIMITED.with_work(100), &mut scratch);
+    assert_eq!(times(&answer.verdict), Some([0.0, 0.0]), "{answer:?}");
     let late = Budget::UNLIMITED.with_deadline(Deadline::within(Duration::ZERO));
     let answer = question.within(&late, &mut scratch);
     assert!(
