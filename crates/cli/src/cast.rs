@@ -1,8 +1,10 @@
 //! `cast`: the first place where rays hit a scan, and depth images.
 
 mod depth_picture;
+mod hit_points;
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use clap::Args;
 use nearmiss::slices::Up;
@@ -21,10 +23,11 @@ use crate::parse::parse_radius;
 use crate::posing;
 use crate::preprocess::parse_threads;
 use crate::sentence::world_bounds;
-use crate::units::UnitCheck;
+use crate::units::{UnitCheck, UnitName};
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
-use depth_picture::{Painted, Viewer};
+use depth_picture::Viewer;
+use hit_points::HitPoints;
 
 /// Options of `cast`.
 #[derive(Debug, Clone, Args)]
@@ -41,6 +44,11 @@ pub struct CastArgs {
     /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose: Option<String>,
+    /// Unit of the scan; rays, poses and answers are then in metres
+    ///
+    /// The scan is scaled to metres before --pose is applied. Without it, all are in the unit of the scan.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub units: Option<UnitName>,
     /// Threads to prepare a raw input; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
     pub threads: Option<usize>,
@@ -72,6 +80,9 @@ pub struct CastArgs {
     /// Width of the view in degrees, from 1 to 170
     #[arg(long, value_name = "DEGREES", default_value_t = 75.0, value_parser = parse_angle, help_heading = "Depth image")]
     pub angle: f64,
+    /// Columns and rows of the image, and of its rays, such as 640x480
+    #[arg(long, value_name = "WxH", default_value = "1080x720", value_parser = parse_size, help_heading = "Depth image")]
+    pub size: [usize; 2],
     /// Axis that points up in the image: x, y, z, -x, -y or -z; by default z
     #[arg(
         long,
@@ -81,7 +92,14 @@ pub struct CastArgs {
         help_heading = "Depth image"
     )]
     pub up: Option<Up>,
-    /// Print one JSON object for each ray
+    /// Write the places that are hit as points, in PLY: a simulated scan
+    ///
+    /// Each point has a normal, the index `source` of the measured point, the number `ray` of its ray
+    /// and the length `t` of the ray. Rays are counted from 0, in the order of the file, or by rows of
+    /// the image from the top left.
+    #[arg(long, value_name = "OUT.ply", help_heading = "Output")]
+    pub points: Option<PathBuf>,
+    /// Print one JSON object for each ray, and one for the image
     #[arg(long, help_heading = "Output")]
     pub json: bool,
     /// Show no progress
@@ -104,6 +122,18 @@ struct CastReport {
     micros: f64,
 }
 
+/// The JSON output of `cast --image`.
+#[derive(Debug, Serialize)]
+struct ImageReport {
+    columns: usize,
+    rows: usize,
+    hits: usize,
+    /// The least and the greatest length of a ray that hits.
+    nearest: Option<f64>,
+    furthest: Option<f64>,
+    micros: f64,
+}
+
 /// Parses a place in the world.
 fn parse_place(text: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
@@ -118,6 +148,14 @@ fn parse_angle(text: &str) -> Result<f64, String> {
     angle.ok_or_else(|| "expected an angle from 1 to 170 degrees".into())
 }
 
+/// Parses the size of an image.
+fn parse_size(text: &str) -> Result<[usize; 2], String> {
+    let parts = text.split_once(['x', 'X', '×']);
+    let size = parts.and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
+    let size = size.filter(|size: &[usize; 2]| size.iter().all(|side| (1..=4096).contains(side)));
+    size.ok_or_else(|| "expected columns and rows from 1 to 4096, such as 640x480".into())
+}
+
 impl CastArgs {
     /// The places of `--from` and `--to`, if they are given.
     fn ends(&self) -> Option<[[f64; 3]; 2]> {
@@ -126,16 +164,12 @@ impl CastArgs {
 }
 
 pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
-    let matrix = posing::from_option("--pose", args.pose.as_deref())?;
+    let matrix = posing::in_metres("--pose", args.pose.as_deref(), args.units)?;
     if args.ends().is_some_and(|[from, to]| from == to) {
         return Err(same_places());
     }
     let mut rays = args.rays.as_deref().map(RayFile::open).transpose()?;
-    if let Some(path) = &args.image {
-        let inputs = [Some(&args.scan), args.rays.as_ref()];
-        output::check_apart(path, &inputs.into_iter().flatten().map(PathBuf::as_path).collect::<Vec<_>>())?;
-        picture::check_name(path)?;
-    }
+    check_outputs(args)?;
     let console = Console::new(args.quiet);
     let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
     let scan = opening.open(&args.scan)?;
@@ -146,67 +180,110 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let mut results = Results::new();
     let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
     let unit = 0.01 * scan.sampling_radius() * pose.scale();
-    let asked = (&Target::new(scan.at(&pose), &plan), unit, args.json);
-    let mut check = UnitCheck::new(world_bounds(&scan.at(&pose)), 0.0);
+    let target = Target::new(scan.at(&pose), &plan);
+    let mut asked = Asked { target: &target, unit, is_json: args.json, points: HitPoints::default() };
+    let mut check = UnitCheck::new(world_bounds(&scan.at(&pose)), 0.0, args.units);
+    if let Some(from) = args.from {
+        check.compare(&Aabb { min: from, max: from }, "the place of --from");
+    }
     if let Some([from, to]) = args.ends().filter(|_| args.image.is_none()) {
         let ray = Ray::new(from, [0, 1, 2].map(|k| to[k] - from[k])).with_radius(args.radius.unwrap_or(0.0));
-        answer(asked, &ray, (None, Label::default()), (&mut Scratch::default(), &mut results))?;
+        asked.answer(&ray, (None, Label::default()), (&mut Scratch::default(), &mut results))?;
     }
     if let Some(rays) = &mut rays {
-        answer_all(asked, rays, (&mut check, &mut results))?;
+        asked.answer_all(rays, (&mut check, &mut results))?;
     }
+    let mut points = asked.points;
     if let Some(path) = &args.image {
         let plan = ShapePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan)?;
-        draw(args, &Target::new(scan.at(&pose), &plan), (path, console), &mut results)?;
+        draw(args, &Target::new(scan.at(&pose), &plan), (path, console), (&mut points, &mut results))?;
+    }
+    if let Some(path) = &args.points {
+        points.write(path)?;
     }
     results.flush()
 }
 
-/// A target, the length to which places are rounded, and whether answers are JSON.
-type Asked<'a> = (&'a Target<'a>, f64, bool);
-
-/// Answers all rays of a file.
-fn answer_all(
-    asked: Asked<'_>,
-    rays: &mut RayFile,
-    (check, results): (&mut UnitCheck, &mut Results),
-) -> Result<(), CliError> {
-    let mut scratch = Scratch::default();
-    while let Some((line, text)) = rays.next_line()? {
-        // Answers to the lines before a faulty one are written before the error.
-        let (ray, label) = rays.ray(line, &text).or_else(|fault| results.flush().and(Err(fault)))?;
-        let origin = ray.origin;
-        check.compare(&Aabb { min: origin, max: origin }, format_args!("the ray on line {line}"));
-        answer(asked, &ray, (Some(line), label), (&mut scratch, results))?;
+/// Fails if a file cannot be written, before any work.
+fn check_outputs(args: &CastArgs) -> Result<(), CliError> {
+    let inputs = [Some(&args.scan), args.rays.as_ref()];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+    if let Some(path) = &args.image {
+        output::check_apart(path, &inputs)?;
+        picture::check_name(path)?;
     }
-    Ok(())
+    let Some(path) = &args.points else { return Ok(()) };
+    if args.image.is_some() && args.rays.is_some() {
+        let what =
+            "--points: expected --rays or --image beside it, got both; the numbers of their rays would mix";
+        return Err(CliError::Usage(what.to_owned()));
+    }
+    if args.image.as_ref().is_some_and(|image| output::is_same(image, path)) {
+        return Err(CliError::Usage("--points: expected another file than --image, got the same".into()));
+    }
+    output::check_apart(path, &inputs)
 }
 
-/// Answers one ray of a line, if it has one.
-fn answer(
-    (target, unit, is_json): Asked<'_>,
-    ray: &Ray,
-    (line, label): (Option<u64>, Label),
-    (scratch, results): (&mut Scratch, &mut Results),
-) -> Result<(), CliError> {
-    let start = now();
-    let answer = target.cast(ray, scratch);
-    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-    let micros = start.elapsed().as_nanos() as f64 / 1e3;
-    if !is_json {
-        let start = line.map_or_else(String::new, |line| format!("line {line}{label}: "));
-        return results.line(format_args!("{start}{}", sentence(&answer, unit)));
+/// The questions about rays.
+struct Asked<'a> {
+    target: &'a Target<'a>,
+    /// The length to which places are rounded.
+    unit: f64,
+    is_json: bool,
+    /// What was hit.
+    points: HitPoints,
+}
+
+impl Asked<'_> {
+    /// Answers all rays of a file.
+    fn answer_all(
+        &mut self,
+        rays: &mut RayFile,
+        (check, results): (&mut UnitCheck, &mut Results),
+    ) -> Result<(), CliError> {
+        let mut scratch = Scratch::default();
+        while let Some((line, text)) = rays.next_line()? {
+            // Answers to the lines before a faulty one are written before the error.
+            let (ray, label) = rays.ray(line, &text).or_else(|fault| results.flush().and(Err(fault)))?;
+            let origin = ray.origin;
+            check.compare(&Aabb { min: origin, max: origin }, format_args!("the ray on line {line}"));
+            self.answer(&ray, (Some(line), label), (&mut scratch, results))?;
+        }
+        Ok(())
     }
-    let RayAnswer { hit, evidence } = answer;
-    results.json(&CastReport {
-        label,
-        t: hit.map(|hit| hit.t),
-        point: hit.map(|hit| hit.point),
-        normal: hit.map(|hit| hit.normal),
-        source: hit.map(|hit| hit.source.0),
-        evidence: word(evidence),
-        micros,
-    })
+
+    /// Answers one ray of a line, if it has one.
+    fn answer(
+        &mut self,
+        ray: &Ray,
+        (line, label): (Option<u64>, Label),
+        (scratch, results): (&mut Scratch, &mut Results),
+    ) -> Result<(), CliError> {
+        let start = now();
+        let answer = self.target.cast(ray, scratch);
+        let micros = micros_since(start);
+        self.points.add(answer.hit.as_ref());
+        if !self.is_json {
+            let start = line.map_or_else(String::new, |line| format!("line {line}{label}: "));
+            return results.line(format_args!("{start}{}", sentence(&answer, self.unit)));
+        }
+        let RayAnswer { hit, evidence } = answer;
+        results.json(&CastReport {
+            label,
+            t: hit.map(|hit| hit.t),
+            point: hit.map(|hit| hit.point),
+            normal: hit.map(|hit| hit.normal),
+            source: hit.map(|hit| hit.source.0),
+            evidence: word(evidence),
+            micros,
+        })
+    }
+}
+
+/// The time since `start` in microseconds.
+#[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+fn micros_since(start: Instant) -> f64 {
+    start.elapsed().as_nanos() as f64 / 1e3
 }
 
 /// The error about equal places of `--from` and `--to`.
@@ -219,20 +296,37 @@ fn draw(
     args: &CastArgs,
     target: &Target<'_>,
     (path, console): (&Path, Console),
-    results: &mut Results,
+    (points, results): (&mut HitPoints, &mut Results),
 ) -> Result<(), CliError> {
     let Some(ends) = args.ends() else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
-    let viewer = Viewer::new(&view, target, ends, args.angle).ok_or_else(same_places)?;
+    let viewer = Viewer::new(&view, target, ends, (args.angle, args.size)).ok_or_else(same_places)?;
     let bar = console.spinner(format_args!("painting {}", path.display()));
     let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let Painted { picture, share } = depth_picture::paint(target, &viewer, args.radius.unwrap_or(0.0), &name);
+    let start = now();
+    let hits = depth_picture::shoot(target, &viewer, args.radius.unwrap_or(0.0));
+    let micros = micros_since(start);
+    let (picture, share) = (depth_picture::paint(&hits, &viewer, &name), depth_picture::share(&hits));
+    hits.iter().for_each(|hit| points.add(hit.as_ref()));
     drop(bar);
     output::save_picture(&picture, path)?;
     if share == 0.0 {
         warn("no ray of the image hits the scan; `nearmiss inspect` tells its bounds for --from and --to");
     }
-    if args.json || args.quiet {
+    if args.json {
+        let lengths = || hits.iter().flatten().map(|hit| hit.t);
+        let ends = (share > 0.0).then(|| lengths().fold([f64::MAX, 0.0], |[a, b], t| [t.min(a), t.max(b)]));
+        let [columns, rows] = args.size;
+        return results.json(&ImageReport {
+            columns,
+            rows,
+            hits: lengths().count(),
+            nearest: ends.map(|ends| ends[0]),
+            furthest: ends.map(|ends| ends[1]),
+            micros,
+        });
+    }
+    if args.quiet {
         return Ok(());
     }
     results.line(format_args!("{} of the rays hit; drawn in {}", percent(share), path.display()))

@@ -44,6 +44,24 @@ pub(crate) fn rounded_down(x: f64, unit: f64) -> String {
     }
 }
 
+/// Formats a positive length, never rounding down, so that an upper bound stays one.
+pub(crate) fn rounded_up(x: f64, unit: f64) -> String {
+    match decimals(unit) {
+        Some(decimals) if x >= unit && PLAIN.contains(&x) => {
+            let step = 0.1_f64.powi(i32::try_from(decimals).unwrap_or(0));
+            rounded(x + 0.5 * step, unit)
+        }
+        _ => short(x * 1.005),
+    }
+}
+
+/// Formats the bounds of a length, the lower one rounded down and the upper one up, to `unit` or to a
+/// thousandth of the upper one.
+pub(crate) fn bounds([lower, upper]: [f64; 2], unit: f64) -> [String; 2] {
+    let unit = unit.max(upper / 1000.0);
+    [rounded_down(lower, unit), rounded_up(upper, unit)]
+}
+
 /// Returns the number of decimals that show `unit`, or `None` if there are more than
 /// [`MOST_DECIMALS`].
 fn decimals(unit: f64) -> Option<usize> {
@@ -186,10 +204,22 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_never_rounded_up() {
-        for (x, unit) in [(0.123_46, 0.001), (0.000_999_9, 0.001), (3.999_6e17, 1e14), (9.999e-9, 1e-11)] {
-            let shown: f64 = rounded_down(x, unit).parse().unwrap();
-            assert!(shown <= x && shown > 0.98 * x, "{shown} for {x}");
+    fn bounds_stay_bounds() {
+        for (x, unit) in [
+            (0.123_46, 0.001),
+            (0.000_999_9, 0.001),
+            (3.999_6e17, 1e14),
+            (9.999e-9, 1e-11),
+            (1_391.332_04, 0.000_3),
+            (1.004_9, 2.0),
+            (0.018_447, 0.02),
+        ] {
+            let [low, high]: [f64; 2] =
+                [rounded_down(x, unit), rounded_up(x, unit)].map(|text| text.parse().unwrap());
+            assert!(low <= x && low > 0.98 * x, "{low} for {x}");
+            assert!(high >= x && high < 1.02 * x, "{high} for {x}");
         }
+        assert_eq!(bounds([1_391.332_04, 1_391.4], 0.000_3), ["1391", "1392"]);
+        assert_eq!(bounds([0.0, 0.055_31], 0.001), ["0", "0.056"]);
     }
 }

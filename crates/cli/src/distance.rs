@@ -47,7 +47,8 @@ pub struct DistanceArgs {
     pub meaning: MeaningArgs,
     /// Compare the triangles of these inputs instead of points
     ///
-    /// With `both`, the distance is exact. With `a` or `b`, the other input is a scan.
+    /// With `both`, the distance is exact. With `a` or `b`, the other input is a scan. Like scans, meshes are
+    /// hollow: what is wholly inside one is as far as from its faces.
     #[arg(long, value_enum, value_name = "WHICH")]
     pub as_mesh: Option<AsMeshName>,
     /// Stop when the bounds differ by at most this fraction of the upper bound; at least 0, less than 1

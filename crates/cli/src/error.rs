@@ -225,13 +225,14 @@ fn of_other_kind(cause: &LoadError) -> Option<&'static str> {
     };
     match (*found, *expected) {
         (Mesh::KIND, Scan::KIND) => Some(
-            "expected a prepared scan, got a prepared mesh; compare its triangles with `mesh-collide`, or with `collide`, \
-             `distance` or `sweep` and --as-mesh, or make it a scan: put points on its faces with `sample`, or prepare \
-             its vertices with `preprocess` without --as-mesh",
+            "expected a prepared scan, got a prepared mesh; compare its triangles with a scan by `collide A B --as-mesh b` \
+             (or a: the letter of the mesh; `distance` and `sweep` alike), or with a mesh by `mesh-collide`; or make it \
+             a scan: put points on its faces with `sample`, or prepare its vertices with `preprocess` without --as-mesh",
         ),
         (Scan::KIND, Mesh::KIND) => Some(
-            "expected a prepared mesh, got a prepared scan; compare two scans with `collide` or `distance` without \
-             --as-mesh, or prepare the input again with `preprocess --as-mesh`",
+            "expected a prepared mesh, got a prepared scan; compare a scan with a mesh by `collide A B --as-mesh b` (or a: \
+             the letter of the mesh; `distance` and `sweep` alike), two scans without --as-mesh, or prepare an input \
+             that has faces again with `preprocess --as-mesh`",
         ),
         _ => None,
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::digits::{count, rounded, short};
+use crate::digits::{bounds, count, rounded_up, short};
 use crate::error::CliError;
 use crate::output;
 use crate::path_entry::{PathEntry, PathVerdict};
@@ -173,10 +173,11 @@ impl<'a> PathLog<'a> {
         let mut text = format!("{total}: {}.", counts.join(", "));
         if let Some(PathEntry { clearance: Some(bounds), .. }) = &self.least {
             let where_found = self.least.as_ref().map(|least| least.where_found(unit)).unwrap_or_default();
-            text += &format!(" Smallest clearance of those apart: {}, on {where_found}.", between(*bounds));
+            text +=
+                &format!(" Smallest clearance of those apart: {}, on {where_found}.", between(*bounds, unit));
         }
         if let Some(PathEntry { penetration: Some([_, upper]), line, .. }) = &self.deepest {
-            let upper = rounded(upper + 0.5 * unit, unit);
+            let upper = rounded_up(*upper, unit);
             text += &format!(" Greatest way out: moving b by {upper} separates them, on line {line}.");
         }
         if let (unknown @ 1.., line) = self.unknown {
@@ -191,10 +192,10 @@ impl<'a> PathLog<'a> {
 }
 
 /// Returns the bounds of a clearance as text.
-fn between([lower, upper]: [f64; 2]) -> String {
-    match (short(lower.max(0.0)), short(upper)) {
-        (lower, upper) if lower == upper => upper,
-        (lower, upper) if lower == "0" => format!("at most {upper}"),
-        (lower, upper) => format!("between {lower} and {upper}"),
+fn between([lower, upper]: [f64; 2], unit: f64) -> String {
+    if lower.to_bits() == upper.to_bits() {
+        return short(upper);
     }
+    let [least, most] = bounds([lower, upper], unit);
+    if lower > 0.0 { format!("between {least} and {most}") } else { format!("at most {most}") }
 }

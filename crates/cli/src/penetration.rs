@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use nearmiss::{Evidence, Interior, Penetration};
 use serde::Serialize;
 
-use crate::digits::{rounded, rounded_down, short};
+use crate::digits::{rounded, rounded_down, rounded_up, short};
 use crate::evidence::word;
 
 /// The names of the scans whose inside counts.
@@ -72,7 +72,7 @@ pub(crate) fn penetration_sentence(
         return None;
     }
     let [x, y, z] = found.direction.map(|x| rounded(x, 1e-5));
-    let upper = rounded(found.upper + 0.5 * unit, unit);
+    let upper = rounded_up(found.upper, unit);
     let within = match found.evidence {
         Evidence::Estimated => {
             format!(" (estimated; gaps below {} cannot be told from contact)", short(found.band))

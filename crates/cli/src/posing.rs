@@ -126,6 +126,12 @@ pub(crate) fn of_options<T: Posable + ?Sized>(
     Ok([placed("--pose-a", 0)?, placed("--pose-b", 1)?])
 }
 
+/// Returns the pose that an option gives as [`from_option`] does, of an object that is scaled from its unit,
+/// if that is named, to metres before.
+pub(crate) fn in_metres(name: &str, given: Option<&str>, unit: Option<UnitName>) -> Result<Matrix, CliError> {
+    Ok(scaled(from_option(name, given)?, unit.map_or(1.0, UnitName::metres)))
+}
+
 /// Returns the pose that an option gives, as numbers or as a file that holds them; the identity if the option
 /// is absent.
 pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, CliError> {

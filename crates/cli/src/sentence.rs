@@ -7,7 +7,7 @@ use nearmiss::{
 };
 
 use crate::advice;
-use crate::digits::{percent, place, rough, rounded, rounded_down, short};
+use crate::digits::{bounds, percent, place, rough, short};
 use crate::evidence::word;
 use crate::picture::stored_index;
 
@@ -119,10 +119,9 @@ pub(crate) fn bracket(found: &Distance, unit: f64) -> String {
     if found.lower.to_bits() == found.upper.to_bits() {
         return format!("{} apart", short(found.upper));
     }
-    let unit = unit.max(found.upper / 1000.0);
-    let upper = rounded(found.upper + 0.5 * unit, unit);
+    let [lower, upper] = bounds([found.lower, found.upper], unit);
     if found.lower > 0.0 {
-        format!("between {} and {upper} apart", rounded_down(found.lower, unit))
+        format!("between {lower} and {upper} apart")
     } else {
         format!("at most {upper} apart")
     }

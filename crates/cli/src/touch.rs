@@ -36,7 +36,7 @@ struct TouchReport {
 }
 
 pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
-    let matrix = posing::from_option("--pose", args.pose.as_deref())?;
+    let matrix = posing::in_metres("--pose", args.pose.as_deref(), args.units)?;
     let mut shapes = ShapeFile::open(&args.shapes)?;
     let asked = Asked::new(args)?;
     if args.path.as_deref() == Some(Path::new("-")) && args.shapes == Path::new("-") {
@@ -51,19 +51,18 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
     // The sampling radius in world units.
     let r = scan.sampling_radius() * pose.scale();
+    let placed = scan.at(&pose);
+    let told = (UnitCheck::new(world_bounds(&placed), r, args.units), r, args.json);
     match asked {
         Some(asked) => {
             let plan = asked.plan(&scan)?;
-            let placed = scan.at(&pose);
             let target = Target::new(placed, &plan);
             match &route {
-                Some(route) => {
-                    along_path((&placed, &target), route, &mut shapes, (r, asked.margin, args.json))
-                }
-                None => of_surface((&placed, &target), asked, &mut shapes, (r, args.json)),
+                Some(route) => along_path((&target, asked), route, &mut shapes, told),
+                None => of_surface(&target, asked, &mut shapes, told),
             }
         }
-        None => of_points(&scan, &scan.at(&pose), &mut shapes, (r, args.json)),
+        None => of_points(&scan, &placed, &mut shapes, told),
     }
 }
 
@@ -72,10 +71,9 @@ fn of_points(
     scan: &Scan,
     placed: &Placed<'_>,
     shapes: &mut ShapeFile,
-    (r, is_json): (f64, bool),
+    (mut check, r, is_json): (UnitCheck, f64, bool),
 ) -> Result<(), CliError> {
-    let mut index = None;
-    let (mut results, mut check) = (Results::new(), UnitCheck::new(world_bounds(placed), r));
+    let (mut index, mut results) = (None, Results::new());
     let mut asked = 0;
     while let Some((line, text)) = shapes.next_line()? {
         // Answers to the lines before a faulty one are written before the error.

@@ -133,18 +133,25 @@ impl SizeCheck {
 pub(crate) struct UnitCheck {
     /// The bounds of the scan and its sampling radius, in the world.
     scan: Option<(Aabb, f64)>,
+    /// What to do about a doubt.
+    remedy: &'static str,
 }
 
 impl UnitCheck {
-    pub(crate) fn new(bounds: Aabb, r: f64) -> Self {
-        Self { scan: Some((bounds, r)) }
+    /// The scan has these bounds and this sampling radius in the world, and its unit may be named.
+    pub(crate) fn new(bounds: Aabb, r: f64, unit: Option<UnitName>) -> Self {
+        let remedy = match unit {
+            Some(_) => "give it in metres, or check --units",
+            None => "give it in the unit of the scan, or both in metres with --units",
+        };
+        Self { scan: Some((bounds, r)), remedy }
     }
 
     /// Compares a thing with these bounds, which is called `name`.
     pub(crate) fn compare(&mut self, bounds: &Aabb, name: impl Display) {
         let doubt = self.scan.as_ref().and_then(|(scan, r)| doubt(bounds, scan, *r));
         if let Some(doubt) = doubt {
-            warn(format_args!("{name} {doubt}; give it in the unit of the scan"));
+            warn(format_args!("{name} {doubt}; {}", self.remedy));
             self.scan = None;
         }
     }

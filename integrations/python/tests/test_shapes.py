@@ -193,6 +193,7 @@ class Motions(unittest.TestCase):
         self.assertTrue(0.43 < hit.t_free <= hit.t_hit)
         self.assertAlmostEqual(hit.witness[2], 0.0, 3)
         self.assertEqual(hit.band, floor.sampling_radius)
+        self.assertEqual(target.sweep(ball, down, work=1).reason, "budget")
         beside = nearmiss.pose(translation=[[0.5, 0.5, 1], [0.5, 0.5, 0.4]])
         free = target.sweep(ball, beside)
         self.assertEqual((free.verdict, free.evidence, free.t_free), ("free", "certified", 1.0))

@@ -12,9 +12,8 @@ use crate::digits::{percent, short};
 use crate::picture::{GAP, GROUND, LEGEND};
 use crate::viewpoint::ViewArgs;
 
-/// Pixels of the image.
-const COLUMNS: usize = 1080;
-const ROWS: usize = 720;
+/// The width of a picture with few pixels, which are squares then.
+const WIDTH: usize = 1080;
 
 /// Colours from the nearest to the furthest hit, which colour-blind readers can tell apart.
 const DEPTHS: [Colour; 5] = [[253, 231, 76], [122, 209, 81], [34, 168, 132], [59, 82, 139], [68, 1, 84]];
@@ -31,19 +30,21 @@ const OUTLYING: f64 = 0.01;
 /// A camera with one vanishing point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Viewer {
+    /// Columns and rows of pixels.
+    size: [usize; 2],
     eye: Vector3<f64>,
     /// To the right, up and ahead, for one unit of depth: to the border of the image.
     axes: [Vector3<f64>; 3],
 }
 
 impl Viewer {
-    /// A camera at `eye` that looks at `place`, `angle` degrees wide, upright as `view` tells. `None` if
-    /// both places are equal.
+    /// A camera at `eye` that looks at `place`, `angle` degrees wide, with so many columns and rows of pixels,
+    /// upright as `view` tells. `None` if both places are equal.
     pub(super) fn new(
         view: &ViewArgs,
         target: &Target<'_>,
         [eye, place]: [[f64; 3]; 2],
-        angle: f64,
+        (angle, size): (f64, [usize; 2]),
     ) -> Option<Self> {
         let eye = Vector3::from(eye);
         let ahead = (Vector3::from(place) - eye).try_normalize(0.0)?;
@@ -52,58 +53,64 @@ impl Viewer {
         let right = ahead.cross(&up).try_normalize(1e-9).unwrap_or_else(|| crate::picture::across(ahead));
         let half = (0.5 * angle).to_radians().tan();
         #[expect(clippy::cast_precision_loss, reason = "pixels")]
-        let tall = half * ROWS as f64 / COLUMNS as f64;
-        Some(Self { eye, axes: [right * half, right.cross(&ahead) * tall, ahead] })
+        let tall = half * size[1] as f64 / size[0] as f64;
+        Some(Self { size, eye, axes: [right * half, right.cross(&ahead) * tall, ahead] })
     }
 
     /// The ray through the middle of a pixel, counted by rows from the top left.
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     fn ray(&self, pixel: usize) -> Ray {
+        let [columns, rows] = self.size;
         let [x, y] = [
-            2.0 * ((pixel % COLUMNS) as f64 + 0.5) / COLUMNS as f64 - 1.0,
-            1.0 - 2.0 * ((pixel / COLUMNS) as f64 + 0.5) / ROWS as f64,
+            2.0 * ((pixel % columns) as f64 + 0.5) / columns as f64 - 1.0,
+            1.0 - 2.0 * ((pixel / columns) as f64 + 0.5) / rows as f64,
         ];
         let [right, up, ahead] = self.axes;
         Ray::new(self.eye.into(), (ahead + right * x + up * y).normalize().into())
     }
 }
 
-/// A depth image.
-pub(super) struct Painted {
-    pub(super) picture: Picture,
-    /// The share of the rays that hit, from 0 to 1.
-    pub(super) share: f64,
-}
-
-/// Casts a ray for each pixel, or moves a ball of `radius` along it, on all threads, and paints the image.
-pub(super) fn paint(target: &Target<'_>, viewer: &Viewer, radius: f64, name: &str) -> Painted {
-    let mut hits: Vec<Option<RayHit>> = vec![None; COLUMNS * ROWS];
+/// Casts a ray for each pixel, or moves a ball of `radius` along it, on all threads. Returns the hits by rows
+/// from the top left.
+pub(super) fn shoot(target: &Target<'_>, viewer: &Viewer, radius: f64) -> Vec<Option<RayHit>> {
+    let mut hits: Vec<Option<RayHit>> = vec![None; viewer.size[0] * viewer.size[1]];
     let _all = each(&mut hits, None, &mut BatchScratch::default(), |pixel, scratch| {
         ControlFlow::Continue(target.cast(&viewer.ray(pixel).with_radius(radius), scratch).hit)
     });
-    let [near, far] = range(&hits);
-    let mut canvas = Canvas::new(COLUMNS * FINE + 2 * GAP, ROWS * FINE + 2 * GAP + LEGEND, GROUND);
+    hits
+}
+
+/// Paints the hits of a scan with this name.
+pub(super) fn paint(hits: &[Option<RayHit>], viewer: &Viewer, name: &str) -> Picture {
+    let [near, far] = range(hits);
+    let [columns, rows] = viewer.size;
+    let edge = (WIDTH / columns).max(1) * FINE;
+    let mut canvas = Canvas::new(columns * edge + 2 * GAP, rows * edge + 2 * GAP + LEGEND, GROUND);
     for (pixel, hit) in hits.iter().enumerate() {
         let tint = hit.map_or(NOTHING, |hit| {
             let along = Vector3::from(viewer.ray(pixel).direction).dot(&Vector3::from(hit.normal)).abs();
             shade(colour((hit.t - near) / (far - near)), GRAZING + (1.0 - GRAZING) * along)
         });
-        let [left, top] = [GAP + pixel % COLUMNS * FINE, GAP + pixel / COLUMNS * FINE];
-        canvas.fill(Area { left, top, width: FINE, height: FINE }, tint);
+        let [left, top] = [GAP + pixel % columns * edge, GAP + pixel / columns * edge];
+        canvas.fill(Area { left, top, width: edge, height: edge }, tint);
     }
-    let count = hits.iter().flatten().count();
-    let [left, top] = [GAP + 4 * FINE, ROWS * FINE + 2 * GAP + 4 * FINE];
-    let width = COLUMNS * FINE - 4 * FINE;
+    let [left, top] = [GAP + 4 * FINE, rows * edge + 2 * GAP + 4 * FINE];
+    let width = columns * edge - 4 * FINE;
     let depths = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| short(near + share * (far - near)));
     let mut entries: Vec<(Option<Colour>, &str)> = vec![(None, "Length of the ray:")];
     entries.extend(DEPTHS.iter().zip(&depths).map(|(&own, depth)| (Some(own), depth.as_str())));
     entries.push((Some(NOTHING), "hits nothing"));
     legend::entries(&mut canvas, [left, top], width, &entries);
-    #[expect(clippy::cast_precision_loss, reason = "pixels")]
-    let share = count as f64 / hits.len() as f64;
-    let told = format!("{name}: {} of the rays hit. Darker where they graze the surface.", percent(share));
+    let told =
+        format!("{name}: {} of the rays hit. Darker where they graze the surface.", percent(share(hits)));
     legend::sentence(&mut canvas, [left, top + legend::LINE], width, &told);
-    Painted { picture: canvas.picture(), share }
+    canvas.picture()
+}
+
+/// The share of the rays that hit, from 0 to 1.
+#[expect(clippy::cast_precision_loss, reason = "pixels")]
+pub(super) fn share(hits: &[Option<RayHit>]) -> f64 {
+    hits.iter().flatten().count() as f64 / hits.len() as f64
 }
 
 /// The lengths of the rays that have the first and the last colour.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::clash::list::{ClashReport, List};
 use crate::contacts::clash_count;
-use crate::digits::{place, rough, rounded_down, short};
+use crate::digits::{bounds, place, rough, short};
 use crate::sentence::{bracket, why};
 
 /// A summary of the whole list, for scripts.
@@ -140,8 +140,10 @@ fn distance(list: &List<'_>, clash: &ClashReport) -> String {
         ("hard", Some(depth)) => format!("{} deep", short(depth)),
         ("hard", None) => "contact".to_owned(),
         _ if clash.lower.to_bits() == clash.upper.to_bits() => upper,
-        _ if clash.lower > 0.0 => format!("{} to {upper}", rounded_down(clash.lower, list.unit())),
-        _ => format!("up to {upper}"),
+        _ => {
+            let [lower, upper] = bounds([clash.lower, clash.upper], list.unit());
+            if clash.lower > 0.0 { format!("{lower} to {upper}") } else { format!("up to {upper}") }
+        }
     }
 }
 

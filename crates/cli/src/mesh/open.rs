@@ -34,8 +34,8 @@ pub(crate) fn read_mesh(path: &Path, format: Option<Format>) -> Result<TriangleM
         ReadError::NoFaces { path } => CliError::UnsuitableFile {
             path,
             what:
-                "expected a mesh, got points without faces; name a file with faces, or compare points with \
-                   `preprocess` and `collide` without --as-mesh"
+                "expected a mesh, got points without faces; name a file with faces; to compare points with a mesh, name \
+                 the mesh by `collide A B --as-mesh a` or `b`; to compare points with points, leave out --as-mesh"
                     .into(),
         },
         cause => CliError::Read(cause),

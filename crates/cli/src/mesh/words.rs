@@ -2,7 +2,7 @@
 
 use nearmiss::{MeshAnswer, MeshContact, MeshDistance, MeshVerdict};
 
-use crate::digits::{place, rounded, rounded_down, short};
+use crate::digits::{bounds, place, rounded, rounded_up, short};
 
 /// The sentence about invalid poses.
 const POSE: &str = "Cannot tell: a pose is not finite, or makes one mesh vanishingly small beside the other; check the poses.";
@@ -23,7 +23,7 @@ pub(crate) fn sentence(answer: &MeshAnswer, distance: Option<&MeshDistance>, uni
             let [percent, centre] = [format!("{:.0}", 100.0 * answer.likelihood), place(region.centre, unit)];
             format!(
                 "Undecided: they touch with a probability of {percent} %, likeliest within {} of {centre}.",
-                rounded(region.radius + 0.5 * unit, unit)
+                rounded_up(region.radius, unit)
             )
         }
         _ => "Cannot tell: the budget ran out; raise --budget or --work.".to_owned(),
@@ -48,10 +48,9 @@ fn apart_by(found: &MeshDistance, unit: f64) -> String {
     if found.complete {
         return format!("{} apart", rounded(found.upper, unit));
     }
-    let unit = unit.max(found.upper / 1000.0);
-    let upper = rounded(found.upper + 0.5 * unit, unit);
+    let [lower, upper] = bounds([found.lower, found.upper], unit);
     if found.lower > 0.0 {
-        format!("between {} and {upper} apart", rounded_down(found.lower, unit))
+        format!("between {lower} and {upper} apart")
     } else {
         format!("at most {upper} apart")
     }

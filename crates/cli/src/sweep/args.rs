@@ -40,6 +40,8 @@ pub struct SweepArgs {
     #[command(flatten)]
     pub meaning: MeaningArgs,
     /// Compare the triangles of these inputs, a, b or both, instead of their points
+    ///
+    /// Like scans, meshes are hollow: what is wholly inside one does not touch it.
     #[arg(long, value_name = "WHICH", value_enum)]
     pub as_mesh: Option<AsMeshName>,
     /// Time limit for the whole motion, such as 50ms

@@ -3,7 +3,7 @@
 use nearmiss::{Contact, Evidence, SweepAnswer, SweepReason, SweepVerdict};
 use serde::Serialize;
 
-use crate::digits::{count, place, rough, rounded_down, short, work};
+use crate::digits::{count, place, rough, rounded_down, rounded_up, short, work};
 use crate::evidence::word;
 use crate::motion_words::{reason_word, time, time_down};
 
@@ -135,7 +135,7 @@ impl Report {
                 format!(
                     "The whole motion is free{wanted} (certified): the distance is always {kept}. The least measured is at \
                      most {}, at t = {}.",
-                    short(upper),
+                    rounded_up(upper, unit),
                     short(at)
                 )
             }

@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::parse::{parse_duration, parse_radius, parse_work};
 use crate::preprocess::parse_threads;
+use crate::units::UnitName;
 
 /// Options of `touch`.
 #[derive(Debug, Clone, Args)]
@@ -27,6 +28,11 @@ pub struct TouchArgs {
     /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose: Option<String>,
+    /// Unit of the scan; shapes, poses and answers are then in metres
+    ///
+    /// The scan is scaled to metres before --pose is applied. Without it, all are in the unit of the scan.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub units: Option<UnitName>,
     /// Also test the surface between the points, and report contacts and bounds of the distance
     ///
     /// Shapes are tested against the obstacle: tangent discs where points sample a sheet, small balls
@@ -60,17 +66,18 @@ pub struct TouchArgs {
     /// The scan's closed surface encloses a solid, so shapes inside overlap it; for --penetration
     ///
     /// Without it, the way out may lead to either side of the surface.
-    #[arg(long, requires = "penetration", conflicts_with = "thickened")]
+    #[arg(long, requires = "penetration", conflicts_with_all = ["thickened", "path"])]
     pub solid: bool,
-    /// Time limit for the penetration of each shape, such as 2ms; for --penetration
+    /// Time limit for each shape, such as 2ms; for --penetration and --path
     ///
-    /// The unit is ns, us, ms or s. When time runs out, both bounds still hold, but are less tight.
-    #[arg(long, value_name = "2ms", requires = "penetration", allow_hyphen_values = true, value_parser = parse_duration)]
+    /// The unit is ns, us, ms or s. When time runs out, the bounds of the penetration still hold, but are
+    /// less tight; of a motion, the answer states what has been proven.
+    #[arg(long, value_name = "2ms", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
-    /// Work limit for the penetration of each shape; reproducible, unlike time
+    /// Work limit for each shape; reproducible, unlike time; for --penetration and --path
     ///
-    /// A unit is one test of the moved shape against the scan.
-    #[arg(long, value_name = "N", requires = "penetration", value_parser = parse_work)]
+    /// A unit is one test of the moved shape against the scan, or one distance query.
+    #[arg(long, value_name = "N", value_parser = parse_work)]
     pub work: Option<u64>,
     /// Threads to prepare a raw input; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]

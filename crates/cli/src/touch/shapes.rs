@@ -47,8 +47,12 @@ fn form_of(text: &str) -> &'static str {
     named.map_or(SHAPE_LINE, |(_, form)| form)
 }
 
-/// A line of a file of shapes, which holds one shape. Other fields of the line are ignored; a shape may
-/// have no others, since a misspelt radius would be none.
+/// The fields of shapes. Beside a shape they would be ignored, and the shape would be another one.
+const OF_SHAPES: [&str; 9] =
+    ["radius", "rounding", "pose", "half", "half_height", "centre", "center", "ends", "points"];
+
+/// A line of a file of shapes, which holds one shape. Other fields of the line are ignored, but not
+/// [those of shapes](OF_SHAPES); a shape may have no others, since a misspelt radius would be none.
 #[derive(Debug, Deserialize)]
 #[serde(expecting = "an object")]
 struct ShapeLine {
@@ -162,6 +166,15 @@ impl ShapeLine {
         add(self.hull.map(HullLine::read));
         add(self.triangle.map(TriangleLine::read));
         add(self.segment.map(SegmentLine::read));
+        let misplaced = || OF_SHAPES.iter().find(|&&name| self.others.contains_key(name));
+        if !shapes.is_empty()
+            && let Some(name) = misplaced()
+        {
+            return Err(format!("expected `{name}` within the shape, got it beside it; {SHAPE_LINE}"));
+        }
+        if self.others.contains_key("margin") {
+            return Err("expected a margin by the option --margin, got `margin` on a line; remove it".into());
+        }
         match (shapes.pop(), shapes.len(), self.others.keys().next()) {
             (Some(shape), 0, _) => shape,
             (None, _, Some(_)) if self.others.contains_key("type") => {

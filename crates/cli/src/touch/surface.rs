@@ -3,18 +3,17 @@
 use std::time::Duration;
 
 use nearmiss::{
-    Budget, CollideOptions, Deadline, Interior, Placed, PlanError, Reason, Scan, Scratch, Semantics, Shape,
+    Budget, CollideOptions, Deadline, Interior, PlanError, Reason, Scan, Scratch, Semantics, Shape,
     ShapeContact, ShapePlan, ShapeVerdict, Target,
 };
 use serde::Serialize;
 
 use crate::console::{Results, now};
-use crate::digits::{place, rounded, rounded_down, short};
+use crate::digits::{bounds, place, rounded, rounded_up, short};
 use crate::error::CliError;
 use crate::evidence::word;
 use crate::label::Label;
 use crate::penetration::{PenetrationReport, penetration_sentence};
-use crate::sentence::world_bounds;
 use crate::touch::args::TouchArgs;
 use crate::touch::shapes::ShapeFile;
 use crate::units::UnitCheck;
@@ -26,7 +25,7 @@ pub(super) struct Asked {
     pub(super) margin: f64,
     /// The inside of the scan, if the penetration is wanted.
     interior: Option<Interior>,
-    /// Limits for each penetration.
+    /// Limits for each penetration or motion.
     time: Option<Duration>,
     work: Option<u64>,
 }
@@ -34,6 +33,15 @@ pub(super) struct Asked {
 impl Asked {
     /// Returns `None` if points alone count.
     pub(super) fn new(args: &TouchArgs) -> Result<Option<Self>, CliError> {
+        let limits = [("--budget", args.budget.is_some()), ("--work", args.work.is_some())];
+        if let Some((name, _)) = limits.into_iter().find(|(_, is_given)| *is_given)
+            && !args.penetration
+            && args.path.is_none()
+        {
+            return Err(CliError::Usage(format!(
+                "{name}: expected --penetration or --path beside it, got neither; other answers take microseconds"
+            )));
+        }
         let semantics = match args.thickened {
             Some(radius) => Semantics::Thickened(radius),
             None if args.surface => Semantics::Obstacle,
@@ -70,8 +78,8 @@ impl Asked {
         ShapePlan::new(&options, scan)
     }
 
-    /// Returns the budget of a penetration that starts now.
-    fn budget(&self) -> Budget {
+    /// Returns the budget of a penetration or motion that starts now.
+    pub(super) fn budget(&self) -> Budget {
         let mut budget = Budget::UNLIMITED;
         budget.work = self.work;
         budget.deadline = self.time.and_then(|time| now().checked_add(time)).map(Deadline::at);
@@ -100,12 +108,11 @@ struct SurfaceReport<'a> {
 
 /// Tests shapes against the surface of a scan.
 pub(super) fn of_surface(
-    (placed, target): (&Placed<'_>, &Target<'_>),
+    target: &Target<'_>,
     asked: Asked,
     shapes: &mut ShapeFile,
-    (r, is_json): (f64, bool),
+    (mut check, r, is_json): (UnitCheck, f64, bool),
 ) -> Result<(), CliError> {
-    let mut check = UnitCheck::new(world_bounds(placed), r);
     let (mut scratch, mut contacts, mut results) = (Scratch::default(), Vec::new(), Results::new());
     while let Some((line, text)) = shapes.next_line()? {
         let read = shapes.shape(line, &text, r);
@@ -188,9 +195,10 @@ fn sentence(report: &SurfaceReport<'_>, margin: f64, unit: f64) -> String {
         Some(false) => {
             let apart = match (report.lower, report.upper) {
                 (Some(lower), Some(upper)) if lower > 0.0 => {
-                    format!("{} to {} apart", rounded_down(lower, unit), short(upper))
+                    let [lower, upper] = bounds([lower, upper], unit);
+                    format!("{lower} to {upper} apart")
                 }
-                (_, Some(upper)) => format!("at most {} apart", short(upper)),
+                (_, Some(upper)) => format!("at most {} apart", rounded_up(upper, unit)),
                 _ => "nothing is near".to_owned(),
             };
             format!("No contact ({evidence}); {apart}.")

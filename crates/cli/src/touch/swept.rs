@@ -3,20 +3,20 @@
 use std::path::Path;
 
 use nearmiss::{
-    Aabb, Evidence, Motion, MotionError, Placed, Pose, Scratch, ShapeContact, ShapeSweep, ShapeSweepVerdict,
+    Aabb, Budget, Evidence, Motion, MotionError, Pose, Scratch, ShapeContact, ShapeSweep, ShapeSweepVerdict,
     SweepReason, Target,
 };
 use serde::Serialize;
 
 use crate::console::{Results, now};
-use crate::digits::{count, place, rounded_down, short};
+use crate::digits::{count, place, rounded_down, rounded_up, short};
 use crate::error::CliError;
 use crate::evidence::word;
 use crate::label::Label;
 use crate::motion_words::{reason_word, time, time_down};
 use crate::posing::{Posable, PoseFile};
-use crate::sentence::world_bounds;
 use crate::touch::shapes::{ReadShape, ShapeFile};
+use crate::touch::surface::Asked;
 use crate::units::UnitCheck;
 
 /// The JSON output of `touch --path`. Times count lines of the path from the first one, which is at 0.
@@ -105,12 +105,11 @@ impl Route {
 
 /// Moves each shape along the path.
 pub(super) fn along_path(
-    (placed, target): (&Placed<'_>, &Target<'_>),
+    (target, asked): (&Target<'_>, Asked),
     route: &Route,
     shapes: &mut ShapeFile,
-    (r, margin, is_json): (f64, f64, bool),
+    (mut check, r, is_json): (UnitCheck, f64, bool),
 ) -> Result<(), CliError> {
-    let mut check = UnitCheck::new(world_bounds(placed), r);
     let (mut scratch, mut results) = (Scratch::default(), Results::new());
     while let Some((line, text)) = shapes.next_line()? {
         let mut ask = || -> Result<_, CliError> {
@@ -119,7 +118,7 @@ pub(super) fn along_path(
             let motion = route.of(&Rigid { bounds, r })?;
             let first = Aabb::of(bounds.corners().map(|corner| motion.at(0.0).apply(corner)));
             check.compare(&first, format_args!("the shape on line {line}, at the first pose,"));
-            match answer(target, (&shape, label), &motion, &mut scratch) {
+            match answer(target, (&shape, label), (&motion, &asked.budget()), &mut scratch) {
                 (_, report) if report.reason == Some("shape") => Err(shapes.too_far(line)),
                 (_, report) if report.reason == Some("pose") => Err(route.too_far()),
                 told => Ok(told),
@@ -131,7 +130,8 @@ pub(super) fn along_path(
             results.json(&report)?;
         } else {
             let label = &report.label;
-            results.line(format_args!("line {line}{label}: {}", sentence(&answer, margin, 0.01 * r)))?;
+            results
+                .line(format_args!("line {line}{label}: {}", sentence(&answer, asked.margin, 0.01 * r)))?;
         }
     }
     results.flush()
@@ -141,11 +141,11 @@ pub(super) fn along_path(
 fn answer(
     target: &Target<'_>,
     (shape, label): (&ReadShape, Label),
-    motion: &Motion,
+    (motion, budget): (&Motion, &Budget),
     scratch: &mut Scratch,
 ) -> (ShapeSweep, SweptReport) {
     let start = now();
-    let answer = target.sweep(&shape.shape(), motion, scratch);
+    let answer = target.sweep_within(&shape.shape(), motion, budget, scratch);
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
     let mut report = SweptReport {
@@ -196,7 +196,7 @@ fn sentence(answer: &ShapeSweep, margin: f64, unit: f64) -> String {
             let kept = if clearance > 0.0 { rounded_down(clearance, unit) } else { "0".to_owned() };
             format!(
                 "The whole motion is free (certified): always at least {kept} from the scan, at most {} at t = {}.",
-                short(upper),
+                rounded_up(upper, unit),
                 short(at)
             )
         }
@@ -212,7 +212,7 @@ fn sentence(answer: &ShapeSweep, margin: f64, unit: f64) -> String {
                 SweepReason::Near => {
                     format!("at t = {} the shape is nearer than can be proven apart", time_down(t_free))
                 }
-                SweepReason::Budget => "the search was longer than any should be".to_owned(),
+                SweepReason::Budget => "the budget ran out".to_owned(),
                 _ => "the scan proves no separation".to_owned(),
             };
             format!("Cannot tell: {why}; no contact was found. {}", free_to(t_free))

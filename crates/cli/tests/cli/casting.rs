@@ -128,3 +128,53 @@ fn a_depth_image_shows_the_ball_in_its_middle() {
     }
     place.refused(2, &["cast", "ball.xyz", "--image", "depth.png"], &["--from"]);
 }
+
+#[test]
+fn hits_are_points_that_can_be_prepared() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.05);
+    let camera = ["cast", "ball.xyz", "--from=4,0,0", "--to=0,0,0", "--image", "depth.png"];
+    let more = ["--size", "90x60", "--points", "hits.ply", "--json"];
+    let told = place.ok(&[&camera[..], &more].concat()).json();
+    assert_eq!(keys(&told[0]), sorted("columns rows hits nearest furthest micros"));
+    assert!(told.len() == 1 && told[0]["columns"] == 90 && told[0]["rows"] == 60, "{told:?}");
+    let [nearest, furthest] = ["nearest", "furthest"].map(|key| told[0][key].as_f64().unwrap());
+    // The furthest places are where rays graze the ball, √15 away.
+    assert!((nearest - 3.0).abs() < 0.01 && (furthest - 15.0_f64.sqrt()).abs() < 0.1, "{told:?}");
+    // Squares of twelve pixels.
+    assert_eq!(place.picture("depth.png").0, 1080 + 24);
+    let points = place.ok(&["preprocess", "hits.ply", "-o", "hits.nm", "--json"]).json();
+    assert_eq!(points[0]["points"], told[0]["hits"]);
+    let head = std::fs::read(place.path("hits.ply")).unwrap();
+    let head = String::from_utf8_lossy(&head[..400]);
+    for property in ["double x", "float nx", "uint source", "uint ray", "float t"] {
+        assert!(head.contains(&format!("property {property}")), "{head}");
+    }
+    place.write("rays.jsonl", RAYS);
+    place.ok(&[
+        "cast",
+        "ball.xyz",
+        "--pose",
+        &shift(3.0, 0.0, 0.0),
+        "--rays",
+        "rays.jsonl",
+        "--points",
+        "five.ply",
+    ]);
+    let five = std::fs::read(place.path("five.ply")).unwrap();
+    assert!(String::from_utf8_lossy(&five).contains("element vertex 3"), "three of five rays hit");
+    for (more, words) in [
+        (&["--size", "0x60"][..], &["--size", "640x480"][..]),
+        (&["--rays", "rays.jsonl", "--points", "hits.ply"], &["--points", "--rays", "--image"]),
+        (&["--points", "depth.png"], &["--points", "--image"]),
+    ] {
+        place.refused(2, &[&camera[..], more].concat(), words);
+    }
+    place.refused(
+        2,
+        &["cast", "ball.xyz", "--from=4,0,0", "--to=0,0,0", "--points", "ball.xyz"],
+        &["replace"],
+    );
+    let far = place.ok(&["cast", "ball.xyz", "--from=4000,0,0", "--to=0,0,0"]).errors;
+    assert!(far.contains("the place of --from is 4000 away") && far.contains("--units"), "{far}");
+}

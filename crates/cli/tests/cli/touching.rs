@@ -60,6 +60,11 @@ fn what_is_no_shape_is_refused_with_its_line() {
             r#"{"box":{"pose":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1],"radios":1}}"#,
             &["line 2", "unknown field `radios`"],
         ),
+        (
+            r#"{"sphere":{"centre":[0,0,0],"radius":1},"radius":0.5}"#,
+            &["line 2", "expected `radius` within the shape, got it beside it"],
+        ),
+        (r#"{"sphere":{"centre":[0,0,0],"radius":1},"margin":1}"#, &["line 2", "--margin"]),
         (r#"{"prism":{}}"#, &["line 2", "unknown shape `prism`; known: sphere, capsule, box, cylinder"]),
         (r#"{"cone":{}}"#, &["line 2", "pose", r#"a cone is {"cone":{"pose":"#]),
         (r#"{"capsule":{"#, &["line 2", "the whole object on one line", "a capsule is"]),
@@ -139,6 +144,15 @@ fn shapes_in_another_unit_are_doubted() {
             assert!(words.is_none_or(|words| told.contains(words)), "{line}: {told}");
         }
     }
+    // A scan in millimetres, and shapes in metres.
+    place.write("shapes.jsonl", r#"{"sphere":{"centre":[0,0,0.0014],"radius":0.0005}}"#);
+    let asked = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--surface", "--units", "mm", "--json"];
+    let told = place.ok(&asked);
+    assert!(told.errors.is_empty(), "{}", told.errors);
+    let depth = told.json()[0]["contacts"][0]["depth"].as_f64().unwrap();
+    assert!((depth - 1e-4).abs() < 5e-5, "{depth}");
+    let told = ask(r#"{"sphere":{"centre":[0,0,1],"radius":0.001}}"#, true).errors;
+    assert!(told.contains("both in metres with --units"), "{told}");
     for line in
         [r#"{"sphere":{"centre":[1e300,0,0],"radius":1}}"#, r#"{"sphere":{"centre":[0,0,0],"radius":1e300}}"#]
     {
@@ -248,6 +262,15 @@ fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
     let people = asked("past.jsonl", &[]).results;
     assert!(people.contains("The whole motion is free (certified): always at least 0."), "{people}");
 
+    let cut = asked("into.txt", &["--work", "2", "--json"]).json();
+    for (line, whole) in cut.iter().zip(&told) {
+        let [free, hit] = [line, whole].map(|line| line["t_free"].as_f64().unwrap());
+        assert!(line["reason"] == "budget" && line["distances"] == 2, "{line}");
+        assert!(free > 0.1 && free <= hit, "{line}, {whole}");
+    }
+    let people = asked("into.txt", &["--budget", "1ns"]).results;
+    assert!(people.contains("Cannot tell: the budget ran out"), "{people}");
+
     place.write("turned.jsonl", "{\"a\":[1,0,0,0,0,0,1]}\n");
     let touch = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--path"];
     let refused = |status: i32, path: &str, more: &[&str], what: &[&str]| {
@@ -256,6 +279,7 @@ fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
     refused(2, "into.txt", &[], &["--path", "--surface"]);
     refused(1, "turned.jsonl", &["--surface"], &["turned.jsonl", "line 1", "--pose"]);
     refused(1, "none.txt", &["--surface"], &["none.txt"]);
+    place.refused(2, &[&touch[..4], &["--surface", "--work", "9"]].concat(), &["--work", "--path"]);
 }
 
 #[test]
