@@ -230,7 +230,7 @@ struct Asked<'a> {
     /// The length to which places are rounded.
     unit: f64,
     is_json: bool,
-    /// What was hit.
+    /// The hits so far.
     points: HitPoints,
 }
 

@@ -40,8 +40,9 @@ pub struct CollideArgs {
     pub meaning: MeaningArgs,
     /// Compare the triangles of these inputs instead of points
     ///
-    /// `both` does what `mesh-collide` does. With `a` or `b`, the other input is a scan. Like scans, meshes are
-    /// hollow: what is wholly inside one does not touch it. Only --penetration counts that as an overlap.
+    /// `both` does what `mesh-collide` does. With `a` or `b`, the other input is a scan. Like scans,
+    /// meshes are hollow: what is wholly inside one does not touch it. Only --penetration counts that as
+    /// an overlap.
     #[arg(long, value_enum, value_name = "WHICH")]
     pub as_mesh: Option<AsMeshName>,
     /// Count scans as touching if they come nearer than this, in world units

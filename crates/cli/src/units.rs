@@ -133,7 +133,7 @@ impl SizeCheck {
 pub(crate) struct UnitCheck {
     /// The bounds of the scan and its sampling radius, in the world.
     scan: Option<(Aabb, f64)>,
-    /// What to do about a doubt.
+    /// The advice that follows a doubt.
     remedy: &'static str,
 }
 

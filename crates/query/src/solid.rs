@@ -30,6 +30,7 @@ pub(crate) mod plane;
 pub(crate) mod portal;
 pub(crate) mod probe;
 pub(crate) mod ray;
+pub(crate) mod ray_hits;
 pub(crate) mod ray_lanes;
 pub(crate) mod reach;
 pub(crate) mod refine;

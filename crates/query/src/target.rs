@@ -12,7 +12,7 @@ use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::shapes::penetration;
 use crate::question::Scratch;
 use crate::solid::answer::{ShapeAnswer, ShapeContact, ShapeDistance, ShapeVerdict};
-use crate::solid::cast::{Wanted, all_hits, crossings, next_hit};
+use crate::solid::cast::{Wanted, all_hits, crossings};
 use crate::solid::contacts::contacts;
 use crate::solid::core::Solid;
 use crate::solid::distance::distance;
@@ -20,6 +20,7 @@ use crate::solid::elements::Elements;
 use crate::solid::hint::ShapeHint;
 use crate::solid::plan::ShapePlan;
 use crate::solid::ray::{Ray, RayAnswer, RayHit, StoredRay};
+use crate::solid::ray_hits::next_hit;
 use crate::solid::shape::Shape;
 use crate::solid::touch::touch_shape;
 
@@ -153,7 +154,7 @@ impl<'a> Target<'a> {
         let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
         let found = &mut solid.crossings;
         let evidence = crossings(&self.elements, &stored, Wanted::First, (level, &mut *found));
-        let hit = next_hit(&self.elements, &stored, found, &mut 0, &mut contact.gathers[0]);
+        let hit = next_hit(&self.elements, &stored, (found, false), &mut 0, &mut contact.gathers[0]);
         let hit = hit.map(|(hit, _)| hit);
         RayAnswer { hit, evidence: hit.map_or(evidence, |hit| hit.evidence) }
     }
@@ -167,7 +168,7 @@ impl<'a> Target<'a> {
         // Without a disc or ball, a hole between discs may still hold surface.
         let _evidence = crossings(&self.elements, &stored, Wanted::Any, (level, &mut *found));
         found.iter().any(|it| it.is_sure())
-            || next_hit(&self.elements, &stored, found, &mut 0, &mut contact.gathers[0]).is_some()
+            || next_hit(&self.elements, &stored, (found, false), &mut 0, &mut contact.gathers[0]).is_some()
     }
 
     /// Writes all places where a ray hits the scan to `out`, the nearest first: one for each sheet that

@@ -266,8 +266,8 @@ impl Target {
     /// first impact.
     ///
     /// The shape moves through the poses `path`, of shape (N, 4, 4), by screws; pose k is reached at time k.
-    /// Returns a `SweepAnswer`, whose times count poses. Options are `work` (a distance query is one unit) and
-    /// `seconds`.
+    /// Returns a `SweepAnswer`, whose times count poses. Options are `work` (a distance query is one unit)
+    /// and `seconds`.
     #[pyo3(signature = (shape, path, **options))]
     fn sweep(
         &self,

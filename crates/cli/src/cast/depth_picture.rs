@@ -38,8 +38,8 @@ pub(super) struct Viewer {
 }
 
 impl Viewer {
-    /// A camera at `eye` that looks at `place`, `angle` degrees wide, with so many columns and rows of pixels,
-    /// upright as `view` tells. `None` if both places are equal.
+    /// A camera at `eye` that looks at `place`, `angle` degrees wide, with so many columns and rows of
+    /// pixels, upright as `view` tells. `None` if both places are equal.
     pub(super) fn new(
         view: &ViewArgs,
         target: &Target<'_>,
