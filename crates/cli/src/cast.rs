@@ -64,6 +64,8 @@ pub struct CastArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true, requires = "from")]
     pub to: Option<[f64; 3]>,
     /// Radius of a ball that moves along the ray from --from, or along those of the image; 0 for rays
+    ///
+    /// Rays of a file have a `"radius"` each.
     #[arg(
         long,
         value_name = "R",

@@ -27,7 +27,7 @@ pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
     }
     let mut poses = args.pair.path_file(&args.path)?;
     let swept = Swept::open(args, console)?;
-    let motions = read_motions(&mut poses, &swept)?;
+    let (motions, moving) = read_motions(&mut poses, &swept)?;
     let plan = swept.plan(args)?;
     let first = motions.each_ref().map(|motion| motion.at(0.0));
     let unit = swept.compare_sizes(&first, args, console);
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
         results.json(&report)?;
     } else {
         results.line(report.sentence(&answer, (args.clearance, unit), swept.are_meshes()))?;
-        results.line(report.details())?;
+        results.line(report.details(moving))?;
     }
     results.flush()
 }
@@ -70,8 +70,8 @@ fn budget(args: &SweepArgs, start: Instant) -> Budget {
     budget
 }
 
-/// Reads the poses of the whole path.
-fn read_motions(poses: &mut PoseFile, swept: &Swept) -> Result<[Motion; 2], CliError> {
+/// Reads the poses of the whole path. Also tells which of both move.
+fn read_motions(poses: &mut PoseFile, swept: &Swept) -> Result<([Motion; 2], [bool; 2]), CliError> {
     let (mut lines, mut of_a, mut of_b) = (Vec::new(), Vec::new(), Vec::new());
     while let Some((line, text)) = poses.next_line()? {
         let Posed { poses: [a, b], .. } = poses.poses(line, &text, swept.posable())?;
@@ -89,5 +89,6 @@ fn read_motions(poses: &mut PoseFile, swept: &Swept) -> Result<[Motion; 2], CliE
             poses.fault_on(line, format!("`{name}`: {refused}"))
         })
     };
-    Ok([motion("a", &of_a)?, motion("b", &of_b)?])
+    let moves = |of: &[Pose]| of.iter().any(|pose| *pose != of[0]);
+    Ok(([motion("a", &of_a)?, motion("b", &of_b)?], [moves(&of_a), moves(&of_b)]))
 }

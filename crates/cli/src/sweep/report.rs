@@ -179,8 +179,14 @@ impl Report {
         }
     }
 
-    /// The cost as a line.
-    pub(super) fn details(&self) -> String {
+    /// Which of both move, and the cost, as a line.
+    pub(super) fn details(&self, moving: [bool; 2]) -> String {
+        let moving = match moving {
+            [true, true] => "a and b move",
+            [true, false] => "a moves, b stands still",
+            [false, true] => "b moves, a stands still",
+            [false, false] => "both stand still",
+        };
         let queries = [
             count(u64::from(self.distances), "distance query").replace("querys", "queries"),
             count(u64::from(self.contacts), "contact test"),
@@ -194,6 +200,6 @@ impl Report {
             ],
             self.micros,
         );
-        format!("t counts poses, the first is 0; {}; {cost}", queries.join(", "))
+        format!("{moving}; t counts poses, the first is 0; {}; {cost}", queries.join(", "))
     }
 }
