@@ -83,8 +83,10 @@ pub struct CastArgs {
     #[arg(long, value_name = "DEGREES", default_value_t = 75.0, value_parser = parse_angle, help_heading = "Depth image")]
     pub angle: f64,
     /// Columns and rows of the image, and of its rays, such as 640x480
-    #[arg(long, value_name = "WxH", default_value = "1080x720", value_parser = parse_size, help_heading = "Depth image")]
-    pub size: [usize; 2],
+    ///
+    /// By default 1080x720. Narrow images are enlarged to be as wide.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, requires = "image", help_heading = "Depth image")]
+    pub size: Option<[usize; 2]>,
     /// Axis that points up in the image: x, y, z, -x, -y or -z; by default z
     #[arg(
         long,
@@ -183,7 +185,8 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
     let plan = ShapePlan::new(&CollideOptions::default(), &scan)?;
     let unit = 0.01 * scan.sampling_radius() * pose.scale();
     let target = Target::new(scan.at(&pose), &plan);
-    let mut asked = Asked { target: &target, unit, is_json: args.json, points: HitPoints::default() };
+    let points = args.points.is_some().then(HitPoints::default);
+    let mut asked = Asked { target: &target, unit, is_json: args.json, points };
     let mut check = UnitCheck::new(world_bounds(&scan.at(&pose)), 0.0, args.units);
     if let Some(from) = args.from {
         check.compare(&Aabb { min: from, max: from }, "the place of --from");
@@ -200,7 +203,7 @@ pub(crate) fn run(args: &CastArgs) -> Result<(), CliError> {
         let plan = ShapePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan)?;
         draw(args, &Target::new(scan.at(&pose), &plan), (path, console), (&mut points, &mut results))?;
     }
-    if let Some(path) = &args.points {
+    if let Some((path, points)) = args.points.as_ref().zip(points) {
         points.write(path)?;
     }
     results.flush()
@@ -215,13 +218,16 @@ fn check_outputs(args: &CastArgs) -> Result<(), CliError> {
         picture::check_name(path)?;
     }
     let Some(path) = &args.points else { return Ok(()) };
-    if args.image.is_some() && args.rays.is_some() {
+    if args.from.is_some() && args.rays.is_some() {
         let what =
-            "--points: expected --rays or --image beside it, got both; the numbers of their rays would mix";
+            "--points: expected --rays or --from beside it, got both; the numbers of their rays would mix";
         return Err(CliError::Usage(what.to_owned()));
     }
-    if args.image.as_ref().is_some_and(|image| output::is_same(image, path)) {
-        return Err(CliError::Usage("--points: expected another file than --image, got the same".into()));
+    if path.extension().is_some_and(|extension| !extension.eq_ignore_ascii_case("ply")) {
+        return Err(CliError::Usage(format!(
+            "{}: expected a file name that ends in .ply; points are written as PLY",
+            path.display()
+        )));
     }
     output::check_apart(path, &inputs)
 }
@@ -232,8 +238,8 @@ struct Asked<'a> {
     /// The length to which places are rounded.
     unit: f64,
     is_json: bool,
-    /// The hits so far.
-    points: HitPoints,
+    /// The hits so far, if they are wanted.
+    points: Option<HitPoints>,
 }
 
 impl Asked<'_> {
@@ -264,7 +270,9 @@ impl Asked<'_> {
         let start = now();
         let answer = self.target.cast(ray, scratch);
         let micros = micros_since(start);
-        self.points.add(answer.hit.as_ref());
+        if let Some(points) = &mut self.points {
+            points.add(answer.hit.as_ref());
+        }
         if !self.is_json {
             let start = line.map_or_else(String::new, |line| format!("line {line}{label}: "));
             return results.line(format_args!("{start}{}", sentence(&answer, self.unit)));
@@ -298,18 +306,21 @@ fn draw(
     args: &CastArgs,
     target: &Target<'_>,
     (path, console): (&Path, Console),
-    (points, results): (&mut HitPoints, &mut Results),
+    (points, results): (&mut Option<HitPoints>, &mut Results),
 ) -> Result<(), CliError> {
     let Some(ends) = args.ends() else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
-    let viewer = Viewer::new(&view, target, ends, (args.angle, args.size)).ok_or_else(same_places)?;
+    let [columns, rows] = args.size.unwrap_or([1080, 720]);
+    let viewer = Viewer::new(&view, target, ends, (args.angle, [columns, rows])).ok_or_else(same_places)?;
     let bar = console.spinner(format_args!("painting {}", path.display()));
     let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let start = now();
     let hits = depth_picture::shoot(target, &viewer, args.radius.unwrap_or(0.0));
     let micros = micros_since(start);
     let (picture, share) = (depth_picture::paint(&hits, &viewer, &name), depth_picture::share(&hits));
-    hits.iter().for_each(|hit| points.add(hit.as_ref()));
+    if let Some(points) = points {
+        hits.iter().for_each(|hit| points.add(hit.as_ref()));
+    }
     drop(bar);
     output::save_picture(&picture, path)?;
     if share == 0.0 {
@@ -318,7 +329,6 @@ fn draw(
     if args.json {
         let lengths = || hits.iter().flatten().map(|hit| hit.t);
         let ends = (share > 0.0).then(|| lengths().fold([f64::MAX, 0.0], |[a, b], t| [t.min(a), t.max(b)]));
-        let [columns, rows] = args.size;
         return results.json(&ImageReport {
             columns,
             rows,

@@ -12,8 +12,11 @@ use crate::digits::{percent, short};
 use crate::picture::{GAP, GROUND, LEGEND};
 use crate::viewpoint::ViewArgs;
 
-/// The width of a picture with few pixels, which are squares then.
+/// The least width of a picture, for its legend. If the image has fewer pixels, they are squares.
 const WIDTH: usize = 1080;
+
+/// The greatest height of a picture whose pixels are squares.
+const HEIGHT: usize = 4096;
 
 /// Colours from the nearest to the furthest hit, which colour-blind readers can tell apart.
 const DEPTHS: [Colour; 5] = [[253, 231, 76], [122, 209, 81], [34, 168, 132], [59, 82, 139], [68, 1, 84]];
@@ -84,8 +87,9 @@ pub(super) fn shoot(target: &Target<'_>, viewer: &Viewer, radius: f64) -> Vec<Op
 pub(super) fn paint(hits: &[Option<RayHit>], viewer: &Viewer, name: &str) -> Picture {
     let [near, far] = range(hits);
     let [columns, rows] = viewer.size;
-    let edge = (WIDTH / columns).max(1) * FINE;
-    let mut canvas = Canvas::new(columns * edge + 2 * GAP, rows * edge + 2 * GAP + LEGEND, GROUND);
+    let edge = WIDTH.div_ceil(columns).min((HEIGHT / rows).max(1)) * FINE;
+    let width = (columns * edge).max(WIDTH * FINE);
+    let mut canvas = Canvas::new(width + 2 * GAP, rows * edge + 2 * GAP + LEGEND, GROUND);
     for (pixel, hit) in hits.iter().enumerate() {
         let tint = hit.map_or(NOTHING, |hit| {
             let along = Vector3::from(viewer.ray(pixel).direction).dot(&Vector3::from(hit.normal)).abs();
@@ -95,7 +99,7 @@ pub(super) fn paint(hits: &[Option<RayHit>], viewer: &Viewer, name: &str) -> Pic
         canvas.fill(Area { left, top, width: edge, height: edge }, tint);
     }
     let [left, top] = [GAP + 4 * FINE, rows * edge + 2 * GAP + 4 * FINE];
-    let width = columns * edge - 4 * FINE;
+    let width = width - 4 * FINE;
     let depths = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| short(near + share * (far - near)));
     let mut entries: Vec<(Option<Colour>, &str)> = vec![(None, "Length of the ray:")];
     entries.extend(DEPTHS.iter().zip(&depths).map(|(&own, depth)| (Some(own), depth.as_str())));

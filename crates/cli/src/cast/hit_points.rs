@@ -5,6 +5,7 @@ use std::path::Path;
 use nearmiss::RayHit;
 use nearmiss::io::{Column, PlyPoints};
 
+use crate::console::warn;
 use crate::error::CliError;
 use crate::output;
 
@@ -37,6 +38,9 @@ impl HitPoints {
     /// Writes the points as PLY, with normals, the indices of the measured points, the number of the ray and
     /// its length.
     pub(super) fn write(&self, path: &Path) -> Result<(), CliError> {
+        if self.places.is_empty() {
+            warn(format_args!("no ray hits the scan; {} has no points", path.display()));
+        }
         let columns = [Column::Uint("ray", &self.rays), Column::Float("t", &self.lengths)];
         let ply = PlyPoints::double(&self.places).with_normals(&self.normals).with_source(&self.source);
         let ply = ply.with_columns(&columns);

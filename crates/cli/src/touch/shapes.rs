@@ -166,13 +166,11 @@ impl ShapeLine {
         add(self.hull.map(HullLine::read));
         add(self.triangle.map(TriangleLine::read));
         add(self.segment.map(SegmentLine::read));
-        let misplaced = || OF_SHAPES.iter().find(|&&name| self.others.contains_key(name));
-        if !shapes.is_empty()
-            && let Some(name) = misplaced()
-        {
+        let beside = |name: &str| !shapes.is_empty() && self.others.contains_key(name);
+        if let Some(name) = OF_SHAPES.iter().find(|name| beside(name)) {
             return Err(format!("expected `{name}` within the shape, got it beside it; {SHAPE_LINE}"));
         }
-        if self.others.contains_key("margin") {
+        if beside("margin") {
             return Err("expected a margin by the option --margin, got `margin` on a line; remove it".into());
         }
         match (shapes.pop(), shapes.len(), self.others.keys().next()) {

@@ -212,7 +212,7 @@ fn sentence(answer: &ShapeSweep, margin: f64, unit: f64) -> String {
                 SweepReason::Near => {
                     format!("at t = {} the shape is nearer than can be proven apart", time_down(t_free))
                 }
-                SweepReason::Budget => "the budget ran out".to_owned(),
+                SweepReason::Budget => "the search reached its limit".to_owned(),
                 _ => "the scan proves no separation".to_owned(),
             };
             format!("Cannot tell: {why}; no contact was found. {}", free_to(t_free))

@@ -165,16 +165,22 @@ fn hits_are_points_that_can_be_prepared() {
     assert!(String::from_utf8_lossy(&five).contains("element vertex 3"), "three of five rays hit");
     for (more, words) in [
         (&["--size", "0x60"][..], &["--size", "640x480"][..]),
-        (&["--rays", "rays.jsonl", "--points", "hits.ply"], &["--points", "--rays", "--image"]),
-        (&["--points", "depth.png"], &["--points", "--image"]),
+        (&["--rays", "rays.jsonl", "--points", "hits.ply"], &["--points", "--rays", "--from"]),
+        (&["--points", "hits.png"], &["hits.png", ".ply"]),
     ] {
         place.refused(2, &[&camera[..], more].concat(), words);
     }
     place.refused(
         2,
-        &["cast", "ball.xyz", "--from=4,0,0", "--to=0,0,0", "--points", "ball.xyz"],
+        &["cast", "hits.ply", "--from=4,0,0", "--to=0,0,0", "--points", "hits.ply"],
         &["replace"],
     );
+    place.refused(2, &["cast", "ball.xyz", "--from=4,0,0", "--to=0,0,0", "--size", "9x9"], &["--image"]);
+    // A tall image stays within bounds, as wide as its legend.
+    place.ok(&[&camera[..], &["--size", "2x4096"]].concat());
+    assert_eq!(place.picture("depth.png").0, 1080 + 24);
+    let away = ["cast", "ball.xyz", "--from=4,0,0", "--to=9,0,0", "--points", "none.ply"];
+    assert!(place.ok(&away).errors.contains("none.ply has no points"));
     let far = place.ok(&["cast", "ball.xyz", "--from=4000,0,0", "--to=0,0,0"]).errors;
     assert!(far.contains("the place of --from is 4000 away") && far.contains("--units"), "{far}");
 }

@@ -269,7 +269,7 @@ fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
         assert!(free > 0.1 && free <= hit, "{line}, {whole}");
     }
     let people = asked("into.txt", &["--budget", "1ns"]).results;
-    assert!(people.contains("Cannot tell: the budget ran out"), "{people}");
+    assert!(people.contains("Cannot tell: the search reached its limit"), "{people}");
 
     place.write("turned.jsonl", "{\"a\":[1,0,0,0,0,0,1]}\n");
     let touch = ["touch", "ball.xyz", "--shapes", "shapes.jsonl", "--path"];

@@ -55,9 +55,9 @@ struct Hit {
 impl<C: Course> Sweeping<'_, C> {
     /// Returns the contact at the start, if there is one.
     fn contact_at_start(&mut self) -> Option<Hit> {
-        let Verdict::Intersecting { contact, evidence } = self.touches(&self.screws(0), 0.0).verdict else {
-            return None;
-        };
+        let answer = self.touches(&self.screws(0), 0.0);
+        let Verdict::Intersecting { contact, evidence } = answer.verdict else { return None };
+        self.nearest.band = answer.band;
         Some(Hit { t_hit: 0.0, contact, evidence })
     }
 

@@ -30,9 +30,8 @@ const ROUNDING: f64 = 8e-6;
 /// Rounding of a place along a ray in double precision, relative to the origin.
 const FAR_ROUNDING: f64 = 1e-15;
 
-/// Rounding of places along a ray, in sampling radii, from which on nothing is proven, and from which on
-/// the ray is not compared.
-const FAR_LOST: [f64; 2] = [1e-3, 0.1];
+/// Rounding of places along a ray, in sampling radii, from which on the ray is not compared.
+const FAR_LOST: f64 = 1e-3;
 
 /// The places that a search wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,12 +81,11 @@ pub(crate) fn crossings(
     let off = (centre - ray.at(middle)).norm();
     // By how much double precision may miss a place along the ray.
     let lost = FAR_ROUNDING * (ray.origin.amax() + middle.abs());
-    let spacing = f64::from(elements.arrays.sampling_radius);
-    if off.is_nan() || lost > FAR_LOST[1] * spacing {
+    if off.is_nan() || lost > FAR_LOST * f64::from(elements.arrays.sampling_radius) {
         return Evidence::Estimated;
     }
     if off > size * 1.001 || middle + size < 0.0 || middle - size * 1.001 > ray.max {
-        return elements.of_separation(lost > FAR_LOST[0] * spacing);
+        return elements.of_separation(false);
     }
     let skipped = (middle - 1.01 * size).max(0.0);
     #[expect(clippy::cast_possible_truncation, reason = "counted in `thick`")]
@@ -111,7 +109,7 @@ pub(crate) fn crossings(
         most_sq: f32::INFINITY,
         end: f64::INFINITY,
         found,
-        is_doubtful: elements.of_separation(lost > FAR_LOST[0] * spacing) == Evidence::Estimated,
+        is_doubtful: elements.of_separation(false) == Evidence::Estimated,
     };
     search.limit(ray.max);
     // Ends early if any hit will do.

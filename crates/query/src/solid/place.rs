@@ -7,6 +7,7 @@ use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::{Gap, Solid};
 use crate::solid::deepest::Deepest;
 use crate::solid::elements::{Element, Elements};
+use crate::solid::inner::inner_depth;
 use crate::solid::portal::Lowest;
 
 type Vector = Vector3<f64>;
@@ -153,7 +154,7 @@ fn of_ball(solid: &Solid<'_>, gap: &Gap, (centre, radius): (Vector, f64)) -> Opt
 /// A direction in which the core moves away from a place in it, and the distance after which the place is
 /// outside. It is the shortest of those along the axes of the box about the core, across each of these axes,
 /// to the inside of the shape, across the side of a cone, and across the nearest face of other shapes. It is
-/// the shortest of all, for hulls and shapes of the caller's own up to the precision of [`Solid::depth`].
+/// the shortest of all, for hulls and shapes of the caller's own up to the precision of [`inner_depth`].
 fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
     let to = solid.inside - place;
     let exit = |normal: Vector| (normal, -normal.dot(&(solid.support(&-normal) - place)));
@@ -170,17 +171,24 @@ fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
     for (k, axis) in solid.axes.into_iter().enumerate() {
         let along = axis.dot(&to);
         offer(axis * 1.0_f64.copysign(along));
-        let Some(across) = (to - axis * along).try_normalize(LEAST) else { continue };
+        let ends = solid.round_ends().filter(|_| k == 1);
+        // On the axis of a cone, all ways across are as good.
+        let least = (1e-12 * to.norm()).max(LEAST);
+        let across = (to - axis * along).try_normalize(least).or(ends.map(|_| solid.axes[0]));
+        let Some(across) = across else { continue };
         offer(across);
-        if let Some([below, above]) = solid.round_ends().filter(|_| k == 1) {
+        if let Some([below, above]) = ends {
             let side = across * (2.0 * solid.half.y) + axis * (above - below);
             offer(side.try_normalize(LEAST).unwrap_or(across));
         }
     }
-    if !solid.has_projection()
-        && let Some(inwards) = solid.depth(place).and_then(|(_, inwards)| inwards.try_normalize(LEAST))
-    {
-        offer(inwards);
+    if !solid.has_projection() {
+        let (_, out) = inner_depth(|d| solid.support(d) - place, solid.half.amax());
+        if let Some(out) = out.try_normalize(LEAST) {
+            // If the core is flat, to both sides.
+            offer(-out);
+            offer(out);
+        }
     }
     shortest
 }
@@ -193,6 +201,26 @@ mod tests {
 
     use super::*;
     use crate::solid::shape::Shape;
+
+    /// A place on the axis of a cone is as far from its side as one beside the axis, and a flat hull leaves
+    /// its plane.
+    #[test]
+    fn ways_out_of_cones_on_their_axes_and_of_flat_hulls() {
+        let turn = rotation(&mut rng(7365)).with_translation([1.0, 2.0, 3.0]);
+        let shape = Shape::Cone { pose: turn, half_height: 0.3, radius: 0.2, rounding: 0.0 };
+        let cone = Solid::new(&shape, &Pose::IDENTITY).unwrap();
+        for (up, beside) in [(0.25, 0.0), (0.25, 1e-6), (0.1, 0.0), (-0.2, 0.0)] {
+            let (_, inside) = way_out(&cone, &turn.apply([beside, up, 0.0]).into());
+            let expected = ((3.0 * (0.2 - beside) - 0.3 - up) / 10.0_f64.sqrt()).min(0.3 + up);
+            assert!((inside - expected).abs() < 1e-11, "{up}, {beside}: {inside}, expected {expected}");
+        }
+        let corners = [[0.3, -0.3, 0.3], [-0.3, 0.3, 0.3], [-0.3, 0.3, -0.3], [0.3, -0.3, -0.3]];
+        let corners = corners.map(|corner| turn.apply(corner));
+        let hull = Solid::new(&Shape::Hull { points: &corners, radius: 0.0 }, &Pose::IDENTITY).unwrap();
+        let (normal, inside) = way_out(&hull, &turn.translation().into());
+        let along = Vector::from(turn.rotate_inverse(normal.into())).dot(&Vector::new(1.0, 1.0, 0.0));
+        assert!(inside.abs() < 1e-12 && (along.abs() - 2.0_f64.sqrt()).abs() < 1e-9, "{inside} {normal}");
+    }
 
     /// A shape far from the origin leaves a ball whose centre is in its core.
     #[test]

@@ -8,7 +8,7 @@ use crate::ask::answer::Evidence;
 
 /// A ray in world coordinates, or the path of a ball along one. A ray whose direction has no length,
 /// with a number that is NaN, or with a negative length hits nothing. Neither does a ray from so far away
-/// that rounding moves it by a tenth of a sampling radius: some 10¹⁴ of these radii.
+/// that rounding moves it by a thousandth of a sampling radius: some 10¹¹ of these radii.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ray {
     /// The start.

@@ -392,6 +392,7 @@ fn budgets_end_a_sweep_with_what_is_proven() {
     let answer =
         Question::new(&a, &b, [&still, &touching]).within(&Budget::UNLIMITED.with_work(100), &mut scratch);
     assert_eq!(times(&answer.verdict), Some([0.0, 0.0]), "{answer:?}");
+    assert!(answer.band > 0.0 && answer.band < 1.0, "{answer:?}");
     let late = Budget::UNLIMITED.with_deadline(Deadline::within(Duration::ZERO));
     let answer = question.within(&late, &mut scratch);
     assert!(
