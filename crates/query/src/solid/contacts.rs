@@ -25,6 +25,7 @@ use crate::solid::ends::SheetEnds;
 use crate::solid::gather::{Gather, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
 use crate::solid::place::{Place, most_depth, place_at, place_beside};
+use crate::solid::probe::is_far;
 use crate::solid::refine::refine;
 use crate::solid::sides::Sides;
 
@@ -94,11 +95,14 @@ pub(crate) fn contacts(
         let Candidates { found, places, order, ends } = candidates;
         found.clear();
         places.clear();
-        let mut near = Near::new(elements, solid, false, &mut scratch.corners);
-        near.limit(elements.margin);
-        let search = &mut Gather { near, sides: &sides, found: &mut *found };
-        // The search never ends early.
-        let _whole = near.search(level, elements.margin, search);
+        // About a longer core the clearance of the centre rarely tells more than the list of boxes.
+        if !(solid.is_point() && is_far(elements, solid, (elements.margin, false))) {
+            let mut near = Near::new(elements, solid, false, &mut scratch.corners);
+            near.limit(elements.margin);
+            let search = &mut Gather { near, sides: &sides, found: &mut *found };
+            // The search never ends early.
+            let _whole = near.search(level, elements.margin, search);
+        }
         for &(i, place) in ends.settle(elements, solid, level, (found, scratch)) {
             places.push(Met { is_past_end: true, ..Met::new(elements, i, &place) });
         }

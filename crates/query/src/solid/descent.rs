@@ -10,6 +10,7 @@ use nearmiss_index::{BoxBody, CutBoxVisitor};
 use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
 use crate::solid::lanes::LaneBox;
+use crate::solid::probe::is_far;
 
 /// A shape near a scan, and the distance up to which the scan is of interest.
 #[derive(Debug, Clone, Copy)]
@@ -83,28 +84,15 @@ impl<'s, 'a> Near<'s, 'a> {
         };
         let reach = within + solid.radius + elements.beyond_boxes();
         let starts = leaves.near(solid.centre.into(), solid.half.norm(), reach);
-        // About a longer core the clearance of the centre rarely tells more than the list.
-        let is_far = match &starts {
-            Some(starts) if starts.is_empty() => true,
-            Some(_) if !solid.is_point() => false,
-            _ => self.is_far(within),
+        let is_empty = match &starts {
+            Some(starts) => starts.is_empty(),
+            None => is_far(elements, solid, (within, self.grown)),
         };
-        if is_far {
+        if is_empty {
             return ControlFlow::Continue(());
         }
         let body = BoxBody::new(lanes.centre, lanes.axes, lanes.half, !self.grown);
         leaves.visit_near(level, (&body, starts.as_ref()), visitor)
-    }
-
-    /// Returns `true` if the grid tells at the centre that no disc or ball is within this distance of the
-    /// shape or, if enclosures count, no part of the obstacle.
-    fn is_far(&self, within: f64) -> bool {
-        let (elements, solid) = (self.elements, self.solid);
-        let within = within + solid.radius + solid.half.norm() * (1.0 + 1e-9);
-        elements.clear.is_some_and(|grid| {
-            let at = grid.at(&elements.arrays, solid.centre.into(), within);
-            within < if self.grown { at.obstacle } else { at.discs }
-        })
     }
 
     /// Visits a single leaf, by its number.

@@ -36,6 +36,17 @@ pub(crate) enum Probed<'a> {
     Open(Option<(&'a ClearanceGrid, Clearance<'a>)>),
 }
 
+/// Returns `true` if the grid tells at the centre of a shape that no disc or ball is within this distance of
+/// the shape or, if enclosures count, no part of the obstacle.
+#[inline]
+pub(crate) fn is_far(elements: &Elements<'_>, solid: &Solid<'_>, (within, enclosures): (f64, bool)) -> bool {
+    let within = within + solid.radius + solid.half.norm() * (1.0 + 1e-9);
+    elements.clear.is_some_and(|grid| {
+        let at = grid.at(&elements.arrays, solid.centre.into(), within);
+        within < if enclosures { at.obstacle } else { at.discs }
+    })
+}
+
 /// The answer of the grid about the centre of a shape.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct About<'a> {
