@@ -79,9 +79,9 @@ pub struct CastArgs {
     /// The camera is at --from and looks at --to.
     #[arg(long, value_name = "OUT.png", requires_all = ["from", "to"], help_heading = "Depth image")]
     pub image: Option<PathBuf>,
-    /// Width of the view in degrees, from 1 to 170
-    #[arg(long, value_name = "DEGREES", default_value_t = 75.0, value_parser = parse_angle, help_heading = "Depth image")]
-    pub angle: f64,
+    /// Width of the view in degrees, from 1 to 170; by default 75
+    #[arg(long, value_name = "DEGREES", value_parser = parse_angle, requires = "image", help_heading = "Depth image")]
+    pub angle: Option<f64>,
     /// Columns and rows of the image, and of its rays, such as 640x480
     ///
     /// By default 1080x720. Narrow images are enlarged to be as wide.
@@ -311,7 +311,8 @@ fn draw(
     let Some(ends) = args.ends() else { return Ok(()) };
     let view = ViewArgs { up: args.up.or(Some(Up::Z)), view: None };
     let [columns, rows] = args.size.unwrap_or([1080, 720]);
-    let viewer = Viewer::new(&view, target, ends, (args.angle, [columns, rows])).ok_or_else(same_places)?;
+    let viewer = Viewer::new(&view, target, ends, (args.angle.unwrap_or(75.0), [columns, rows]))
+        .ok_or_else(same_places)?;
     let bar = console.spinner(format_args!("painting {}", path.display()));
     let name = args.scan.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let start = now();
