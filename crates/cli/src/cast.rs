@@ -4,7 +4,6 @@ mod depth_picture;
 mod hit_points;
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::Args;
 use nearmiss::slices::Up;
@@ -12,7 +11,7 @@ use nearmiss::{Aabb, CollideOptions, Detail, Ray, RayAnswer, Scratch, ShapePlan,
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::console::{Console, Results, now, warn};
+use crate::console::{Console, Results, micros_since, now, warn};
 use crate::digits::{percent, place, rounded};
 use crate::error::CliError;
 use crate::evidence::word;
@@ -288,12 +287,6 @@ impl Asked<'_> {
             micros,
         })
     }
-}
-
-/// The time since `start` in microseconds.
-#[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-fn micros_since(start: Instant) -> f64 {
-    start.elapsed().as_nanos() as f64 / 1e3
 }
 
 /// The error about equal places of `--from` and `--to`.

@@ -12,7 +12,7 @@ use nearmiss::store::Progress;
 use nearmiss::{Budget, ClashOptions, ClashPlan, Pair, Scan, Scratch};
 
 use crate::bodies::Views;
-use crate::console::{Console, Results, now};
+use crate::console::{Console, Results, micros_since, now};
 use crate::contacts::{SHOWN, check_outputs};
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -98,8 +98,7 @@ pub(crate) fn run(args: &ClashArgs) -> Result<(), CliError> {
     let found =
         Pair::new(a, b).clashes_watched(&plan, &mut Scratch::default(), &mut |share| progress.reach(share));
     drop(bar);
-    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    let micros = micros_since(start);
 
     let of_points = args.meaning.thickened.is_some();
     let list = List { inputs, views: [&a, &b], of_points, plan: &plan, found: &found };

@@ -13,7 +13,7 @@ use crate::answer_report::AnswerReport;
 use crate::as_mesh::AsMeshName;
 use crate::bodies::{Bodies, Insides, Plan, Wanted};
 use crate::collide_args::{CollideArgs, DetailName, EvidenceName};
-use crate::console::{self, Console, Results, now};
+use crate::console::{self, Console, Results, micros_since, now};
 use crate::distance_picture::paint_apart;
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -56,8 +56,7 @@ impl Question {
             manifold: self.manifold.then(Vec::new),
         };
         let answer = views.collide(&self.plan, &self.budget_from(start), &mut wanted, scratch);
-        #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-        let micros = start.elapsed().as_nanos() as f64 / 1e3;
+        let micros = micros_since(start);
         let clearance = self.clearance.as_ref().filter(|_| needs_clearance(&answer, self.plan.options()));
         let clearance = clearance.map(|plan| views.distance(plan, &self.budget_from(now()), scratch));
         let penetration = self

@@ -177,3 +177,9 @@ impl Results {
 pub(crate) fn now() -> Instant {
     Instant::now()
 }
+
+/// Returns the time since `start` in microseconds.
+#[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+pub(crate) fn micros_since(start: Instant) -> f64 {
+    now().duration_since(start).as_nanos() as f64 / 1e3
+}

@@ -9,7 +9,7 @@ use nearmiss::{Budget, Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadlin
 use serde::Serialize;
 
 use crate::answer_report::AnswerReport;
-use crate::console::{Console, Results, now};
+use crate::console::{Console, Results, micros_since, now};
 use crate::curve_picture;
 use crate::digits::{count, rough, short, work};
 use crate::error::CliError;
@@ -129,8 +129,7 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     } else {
         None
     };
-    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    let micros = micros_since(start);
 
     write(&args.output, &found)?;
     if let Some(path) = &args.image {

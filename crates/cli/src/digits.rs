@@ -35,23 +35,22 @@ pub(crate) fn rounded(x: f64, unit: f64) -> String {
 
 /// Formats a positive length, never rounding up, so that a lower bound stays one.
 pub(crate) fn rounded_down(x: f64, unit: f64) -> String {
-    match decimals(unit) {
-        Some(decimals) if x >= unit && PLAIN.contains(&x) => {
-            let step = 0.1_f64.powi(i32::try_from(decimals).unwrap_or(0));
-            rounded((x - 0.5 * step).max(0.0), unit)
-        }
-        _ => short(x * 0.995),
-    }
+    moved_and_rounded(x, unit, -0.5)
 }
 
 /// Formats a positive length, never rounding down, so that an upper bound stays one.
 pub(crate) fn rounded_up(x: f64, unit: f64) -> String {
+    moved_and_rounded(x, unit, 0.5)
+}
+
+/// Formats a positive length that is moved by so many steps of its last digit before it is rounded.
+fn moved_and_rounded(x: f64, unit: f64, steps: f64) -> String {
     match decimals(unit) {
         Some(decimals) if x >= unit && PLAIN.contains(&x) => {
             let step = 0.1_f64.powi(i32::try_from(decimals).unwrap_or(0));
-            rounded(x + 0.5 * step, unit)
+            rounded((x + steps * step).max(0.0), unit)
         }
-        _ => short(x * 1.005),
+        _ => short(x * (1.0 + 0.01 * steps)),
     }
 }
 

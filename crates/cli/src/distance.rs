@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::as_mesh::AsMeshName;
 use crate::bodies::Bodies;
-use crate::console::{Console, Results, now};
+use crate::console::{Console, Results, micros_since, now};
 use crate::digits::{rough, short, work};
 use crate::distance_picture::paint_distance;
 use crate::error::CliError;
@@ -233,8 +233,7 @@ impl Question<'_> {
         (budget.work, budget.deadline) =
             (self.args.work, self.args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
         let found = views.distance(&self.plan, &budget, scratch);
-        #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-        let micros = start.elapsed().as_nanos() as f64 / 1e3;
+        let micros = micros_since(start);
         views.compare_sizes(&self.sizes);
         if let Some((path, scans)) = self.args.image.as_ref().zip(views.scans()) {
             let style = picture::Style {

@@ -7,7 +7,7 @@ use nearmiss::{
 };
 
 use crate::answer_report::AnswerReport;
-use crate::console::now;
+use crate::console::{micros_since, now};
 use crate::digits::{place, rough, rounded_down};
 use crate::evidence::word;
 use crate::sentence::world_radius;
@@ -34,8 +34,7 @@ impl NoCurve {
             let plan = CollidePlan::new(&options, a.scan(), b.scan())?;
             let start = now();
             let answer = Pair::new(*a, *b).within(budget).collide(&plan, &mut scratch);
-            #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-            let micros = start.elapsed().as_nanos() as f64 / 1e3;
+            let micros = micros_since(start);
             Ok((answer, micros))
         };
         Ok(Self { surfaces: ask(Semantics::Surface)?, obstacles: ask(Semantics::Obstacle)? })

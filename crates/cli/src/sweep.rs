@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use nearmiss::{Budget, Deadline, Motion, MotionError, Pose};
 
-use crate::console::{Console, Results, now};
+use crate::console::{Console, Results, micros_since, now};
 use crate::error::CliError;
 use crate::posing::{PoseFile, Posed};
 use crate::{output, picture as scans_picture};
@@ -35,8 +35,7 @@ pub(crate) fn run(args: &SweepArgs) -> Result<(), CliError> {
     let bar = console.spinner(format_args!("sweeping {duration} steps"));
     let start = now();
     let answer = swept.sweep(&motions, &plan, &budget(args, start));
-    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    let micros = micros_since(start);
     drop(bar);
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));

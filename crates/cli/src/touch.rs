@@ -10,7 +10,7 @@ use std::path::Path;
 use nearmiss::{NearestPoint, Placed, Scan, Shape, ShapeIndex, Target};
 use serde::Serialize;
 
-use crate::console::{Console, Results, now};
+use crate::console::{Console, Results, micros_since, now};
 use crate::digits::{place, short};
 use crate::error::CliError;
 use crate::input::Opening;
@@ -105,8 +105,7 @@ const MANY: u32 = 256;
 fn answer(placed: &Placed<'_>, shape: &Shape<'_>) -> (bool, Option<NearestPoint>, f64) {
     let start = now();
     let (touches, nearest) = (placed.touches(shape), placed.nearest(shape, f64::INFINITY));
-    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    let micros = micros_since(start);
     (touches, nearest, micros)
 }
 

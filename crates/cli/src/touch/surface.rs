@@ -8,7 +8,7 @@ use nearmiss::{
 };
 use serde::Serialize;
 
-use crate::console::{Results, now};
+use crate::console::{Results, micros_since, now};
 use crate::digits::{bounds, place, rounded, rounded_up, short};
 use crate::error::CliError;
 use crate::evidence::word;
@@ -154,8 +154,7 @@ fn answer<'c>(
     let answer = target.touch(shape, scratch);
     let distance = target.distance(shape, f64::INFINITY, scratch);
     target.contacts(shape, contacts, scratch);
-    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    let micros = micros_since(start);
     let (touches, evidence, reason) = match answer.verdict {
         ShapeVerdict::Touching { evidence, .. } => (Some(true), Some(evidence), None),
         ShapeVerdict::Separated { evidence } => (Some(false), Some(evidence), None),

@@ -8,7 +8,7 @@ use nearmiss::{
 };
 use serde::Serialize;
 
-use crate::console::{Results, now};
+use crate::console::{Results, micros_since, now};
 use crate::digits::{count, place, rounded_down, rounded_up, short};
 use crate::error::CliError;
 use crate::evidence::word;
@@ -146,8 +146,7 @@ fn answer(
 ) -> (ShapeSweep, SweptReport) {
     let start = now();
     let answer = target.sweep_within(&shape.shape(), motion, budget, scratch);
-    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
-    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    let micros = micros_since(start);
     let mut report = SweptReport {
         label,
         verdict: "undecided",
