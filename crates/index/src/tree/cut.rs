@@ -161,8 +161,8 @@ fn halve(places: &mut [([f32; 3], u32)], below: usize) {
 
 /// A ray or a body that the boxes of a tree are compared with.
 pub(super) trait BoxQuery {
-    /// Returns the squared distances of the boxes of a group, by its level and number, of which those beyond
-    /// `most_sq` are skipped.
+    /// Returns the squared distances of the boxes of a group, which is given with its level and its number.
+    /// The search skips boxes beyond `most_sq`.
     fn distances_sq<S: Simd>(
         &self,
         simd: S,

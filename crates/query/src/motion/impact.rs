@@ -19,11 +19,11 @@ pub(crate) fn sweep<C: Course>(
 ) -> SweepAnswer {
     let mut sweeping = Sweeping::new((course, motions), plan, budget, scratch);
     let undecided = |t_free, reason| SweepVerdict::Undecided { t_free, reason };
-    // The budget may end before the proof tells that they touch at the start.
-    let at_start = if plan.proves() && budget.may_end() { sweeping.contact_at_start() } else { None };
-    let verdict = if let Some(Hit { t_hit, contact, evidence }) = at_start {
+    let verdict = if !plan.proves() {
+        undecided(0.0, SweepReason::Geodesic)
+    } else if let Some(Hit { t_hit, contact, evidence }) = sweeping.contact_at_start(budget) {
         SweepVerdict::Impact { t_free: 0.0, t_hit, contact, evidence }
-    } else if plan.proves() {
+    } else {
         match sweeping.prove() {
             Ok(()) => {
                 sweeping.tighten();
@@ -38,8 +38,6 @@ pub(crate) fn sweep<C: Course>(
                 Err(reason) => undecided(t_free, reason),
             },
         }
-    } else {
-        undecided(0.0, SweepReason::Geodesic)
     };
     let Sweeping { nearest, distances, contacts, intervals, spent, .. } = sweeping;
     SweepAnswer { verdict, band: nearest.band, distances, contacts, intervals, statistics: spent }
@@ -53,8 +51,11 @@ struct Hit {
 }
 
 impl<C: Course> Sweeping<'_, C> {
-    /// Returns the contact at the start, if there is one.
-    fn contact_at_start(&mut self) -> Option<Hit> {
+    /// Returns the contact at the start, if there is one and a budget may end before the proof stalls there.
+    fn contact_at_start(&mut self, budget: &Budget) -> Option<Hit> {
+        if !budget.may_end() {
+            return None;
+        }
         let answer = self.touches(&self.screws(0), 0.0);
         let Verdict::Intersecting { contact, evidence } = answer.verdict else { return None };
         self.nearest.band = answer.band;

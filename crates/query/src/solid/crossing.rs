@@ -26,6 +26,11 @@ impl Crossing {
         self.beside <= 1.0
     }
 
+    /// Returns `true` if the ray is the path of a ball that touches the disc or ball before it moves.
+    pub(crate) fn is_at_start(&self, ray: &StoredRay) -> bool {
+        ray.radius > 0.0 && self.t == 0.0 && self.is_sure()
+    }
+
     /// The length of the ray in which it may meet other discs of the same sheet: through half the
     /// thickness of the sheet, and no more than a local radius.
     pub(crate) fn layer(&self, elements: &Elements<'_>) -> f64 {

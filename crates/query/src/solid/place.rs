@@ -168,12 +168,12 @@ fn way_out(solid: &Solid<'_>, place: &Vector) -> (Vector, f64) {
             shortest = own;
         }
     };
+    let least = (1e-12 * to.norm()).max(LEAST);
     for (k, axis) in solid.axes.into_iter().enumerate() {
         let along = axis.dot(&to);
         offer(axis * 1.0_f64.copysign(along));
         let ends = solid.round_ends().filter(|_| k == 1);
         // On the axis of a cone, all ways across are as good.
-        let least = (1e-12 * to.norm()).max(LEAST);
         let across = (to - axis * along).try_normalize(least).or(ends.map(|_| solid.axes[0]));
         let Some(across) = across else { continue };
         offer(across);

@@ -36,11 +36,10 @@ const GRAZING: f64 = 0.02;
 pub(crate) fn next_hit(
     elements: &Elements<'_>,
     ray: &StoredRay,
-    (found, are_all): (&[Crossing], bool),
+    (all, are_all): (&[Crossing], bool),
     next: &mut usize,
     scratch: &mut ViewScratch,
 ) -> Option<(RayHit, f64)> {
-    let all = found;
     while let Some(first) = all.get(*next) {
         let start = *next;
         if !elements.is_disc(first.i) {
@@ -59,17 +58,14 @@ pub(crate) fn next_hit(
         };
         let count = all[start..].iter().take_while(is_same).count();
         *next += count;
-        // A ball that touches before it moves has a hit there, wherever it touches next.
-        let starts = ray.radius > 0.0 && first.t == 0.0;
         let sheet = || all[start..start + count].iter().filter(|it| elements.is_disc(it.i));
-        let best = match starts {
+        let best = if first.is_at_start(ray) {
             // The nearest point may be in the ball, which certifies the hit.
-            true => {
-                let away = |it: &Crossing| (elements.position(it.i) - ray.origin).norm_squared();
-                let touching = sheet().filter(|it| it.t == 0.0);
-                touching.min_by(|a, b| away(a).total_cmp(&away(b)))
-            }
-            false => sheet().min_by(|a, b| a.beside.total_cmp(&b.beside)),
+            let away = |it: &Crossing| (elements.position(it.i) - ray.origin).norm_squared();
+            let touching = sheet().filter(|it| it.is_at_start(ray));
+            touching.min_by(|a, b| away(a).total_cmp(&away(b)))
+        } else {
+            sheet().min_by(|a, b| a.beside.total_cmp(&b.beside))
         };
         let Some(best) = best else { continue };
         let found = hit(elements, ray, best, scratch);
@@ -112,8 +108,9 @@ fn hit(
     };
     // The crossing may be known in single precision only.
     let cell = f64::from(elements.arrays.cell_radius(i)).max(disc.radius);
-    let Crossing { t, beside, .. } = meets(ray, &disc, i, cell).unwrap_or(*crossing);
-    if t == 0.0 && ray.radius > 0.0 && beside <= 1.0 {
+    let crossing = meets(ray, &disc, i, cell).unwrap_or(*crossing);
+    let Crossing { t, beside, .. } = crossing;
+    if crossing.is_at_start(ray) {
         let (point, normal, evidence) = at_start(elements, ray, (i, &disc), scratch);
         return Some(told(t, point, normal, evidence));
     }

@@ -8,10 +8,17 @@ use nearmiss_query::{
     Target,
 };
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
-use nearmiss_testdata::shapes::{self, Order, Sampling};
+use nearmiss_testdata::shapes::{self, Form, Order, Sampling};
 use rand::{Rng, RngExt};
 
 type Vector = Vector3<f64>;
+
+/// A scan of a form, with points 0.05 apart.
+fn scanned(form: Form, noise: f64) -> PointHierarchy {
+    let sampled = form.sample(Sampling { spacing: 0.05, noise, order: Order::Random, seed: 2 });
+    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
+    PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap()
+}
 
 /// Shapes of about this size in their own frame.
 fn shapes_of(size: f64) -> [Shape<'static>; 5] {
@@ -47,14 +54,7 @@ fn off_the_torus(p: Vector) -> f64 {
 
 #[test]
 fn free_parts_are_free_and_impacts_are_where_brute_force_finds_them() {
-    let sampled = shapes::torus(1.0, 0.4).sample(Sampling {
-        spacing: 0.05,
-        noise: 0.03,
-        order: Order::Random,
-        seed: 2,
-    });
-    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
-    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let scan = scanned(shapes::torus(1.0, 0.4), 0.03);
     let r = scan.sampling_radius();
     let rng = &mut rng(11);
     let mut scratch = Scratch::default();
@@ -141,10 +141,7 @@ impl SupportMap for Corners {
 
 #[test]
 fn plans_without_proof_find_the_impacts_of_all_shapes_in_a_few_steps() {
-    let sampled =
-        shapes::torus(1.0, 0.4).sample(Sampling { spacing: 0.05, noise: 0.0, order: Order::Random, seed: 2 });
-    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
-    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let scan = scanned(shapes::torus(1.0, 0.4), 0.0);
     let (r, rng, mut scratch) = (scan.sampling_radius(), &mut rng(5), Scratch::default());
     let placed = rotation(rng).with_translation([3.0, -1.0, 2.0]).with_scale(1.5);
     let plan = ShapePlan::new(&CollideOptions::estimated(), &scan).unwrap();
@@ -205,13 +202,7 @@ fn plans_without_proof_find_the_impacts_of_all_shapes_in_a_few_steps() {
 
 #[test]
 fn shapes_that_do_not_move_or_start_in_contact_are_told() {
-    let sampled =
-        shapes::patch(2.0, 2.0).sample(Sampling { spacing: 0.05, noise: 0.0, order: Order::Random, seed: 2 });
-    let scan = PointHierarchy::build(
-        &PointCloud::from_positions(&sampled.points).unwrap(),
-        &BuildOptions::default(),
-    )
-    .unwrap();
+    let scan = scanned(shapes::patch(2.0, 2.0), 0.0);
     let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
     let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
     let mut scratch = Scratch::default();
@@ -248,10 +239,7 @@ fn shapes_that_do_not_move_or_start_in_contact_are_told() {
 /// A limit of work ends a sweep with what the first queries prove.
 #[test]
 fn budgets_end_a_sweep_of_a_shape_with_what_is_proven() {
-    let sampled =
-        shapes::torus(1.0, 0.4).sample(Sampling { spacing: 0.05, noise: 0.0, order: Order::Random, seed: 2 });
-    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
-    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let scan = scanned(shapes::torus(1.0, 0.4), 0.0);
     let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
     let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
     let (ball, scratch) = (Shape::Sphere { centre: [0.0; 3], radius: 0.2 }, &mut Scratch::default());
@@ -276,10 +264,7 @@ fn budgets_end_a_sweep_of_a_shape_with_what_is_proven() {
 
 #[test]
 fn shapes_much_smaller_than_the_spacing_pass_through_no_surface() {
-    let sampled =
-        shapes::patch(2.0, 2.0).sample(Sampling { spacing: 0.05, noise: 0.1, order: Order::Random, seed: 2 });
-    let cloud = PointCloud::from_positions(&sampled.points).unwrap();
-    let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
+    let scan = scanned(shapes::patch(2.0, 2.0), 0.1);
     let plan = ShapePlan::new(&CollideOptions::default(), &scan).unwrap();
     let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
     let (rng, scratch) = (&mut rng(8105), &mut Scratch::default());
