@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod lane;
 pub mod order;
 pub mod parallel;
 pub mod vector;

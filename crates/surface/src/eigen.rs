@@ -12,7 +12,7 @@
 //! There are no branches and no calls, so the same code solves one matrix, or eight in SIMD lanes
 //! ([`symmetric_eigen_batch`](crate::symmetric_eigen_batch)).
 
-use crate::lane::Lane;
+use nearmiss_lanes::lane::Lane;
 
 /// Eigenvalues in ascending order with unit eigenvectors, which form a right-handed frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@
 //! [`symmetric_eigen`](crate::symmetric_eigen) is faster and has no such loss.
 
 use crate::eigen::{determinant, greatest_root, largest};
-use crate::lane::Lane;
+use nearmiss_lanes::lane::Lane;
 
 /// The eigenvalues, and the unit eigenvector of the least eigenvalue.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,6 @@ mod eigen_cholesky;
 mod fit;
 mod gathered;
 mod kernel;
-mod lane;
 mod meet;
 mod neighbourhood;
 mod options;

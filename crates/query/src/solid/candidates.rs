@@ -4,7 +4,7 @@
 //! so a selection does not depend on the order in which leaves were visited.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, u32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::LeafBlock;
 use nearmiss_lanes::id32;
@@ -20,7 +20,7 @@ pub(crate) struct CandidateBlock {
     pub(crate) centres: [[f32; WIDTH]; 3],
     /// Upper bounds on the depths, in the stored frame.
     pub(crate) most: [f32; WIDTH],
-    /// The squared distances from the nearest contact that was selected.
+    /// The squared distances from the nearest contact that was selected, or candidate that was chosen.
     pub(crate) away_sq: [f32; WIDTH],
     /// A candidate gives another contact from this squared distance on.
     pub(crate) apart_sq: [f32; WIDTH],
@@ -69,21 +69,12 @@ pub(crate) struct Slab {
 }
 
 /// A candidate: its block and its lane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Candidate(u32);
 
 /// Blocks of candidates; reusable memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CandidateBlocks(Vec<CandidateBlock>);
-
-/// A number that ranks candidates. The greatest comes first; of equal ones that of the first point.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Rank {
-    /// The bound of the depth of those whose place is not known, before the surface or behind it.
-    Depth { is_front: bool },
-    /// The distance from the nearest contact that was selected.
-    Distance,
-}
 
 impl CandidateBlock {
     /// Candidates from the point `first` on. `measured` are their centres, the bounds of their depths and
@@ -114,23 +105,18 @@ impl CandidateBlock {
         }
     }
 
-    /// The numbers that rank candidates.
+    /// The candidates before or behind the surface whose place is not known, as bits.
     #[inline(always)]
-    fn numbers(&self, rank: Rank) -> &[f32; WIDTH] {
-        match rank {
-            Rank::Depth { .. } => &self.most,
-            Rank::Distance => &self.away_sq,
-        }
+    fn by_depth(&self, is_front: bool) -> u32 {
+        self.lanes & !self.placed & if is_front { !self.behind } else { self.behind }
     }
 
-    /// The candidates that have a rank, as bits.
+    /// The lanes that give another contact, as bits.
     #[inline(always)]
-    fn ranked(&self, rank: Rank) -> u32 {
-        match rank {
-            Rank::Depth { is_front: true } => self.lanes & !self.placed & !self.behind,
-            Rank::Depth { is_front: false } => self.lanes & !self.placed & self.behind,
-            Rank::Distance => self.lanes,
-        }
+    fn apart<S: Simd>(&self, simd: S) -> u32 {
+        let away_sq = f32x16::load_array_ref(simd, &self.away_sq);
+        let is_apart: mask32x16<S> = away_sq.simd_ge(f32x16::load_array_ref(simd, &self.apart_sq));
+        bits(is_apart)
     }
 }
 
@@ -226,12 +212,13 @@ impl CandidateBlocks {
         self.lanes(|block| block.missed)
     }
 
-    /// All candidates, each with a key that orders them, the first one last.
-    pub(crate) fn ordered(&self, rank: Rank) -> impl Iterator<Item = (u64, Candidate)> {
-        self.lanes(move |block| block.ranked(rank)).map(move |candidate| {
+    /// All candidates whose place is not known, each with a key that orders them by their depth, the first
+    /// one last.
+    pub(crate) fn ordered(&self, is_front: bool) -> impl Iterator<Item = (u64, Candidate)> {
+        self.lanes(move |block| block.by_depth(is_front)).map(move |candidate| {
             let (block, lane) = self.at(candidate);
             // The bits of floats in their order.
-            let bits = block.numbers(rank)[lane].to_bits();
+            let bits = block.most[lane].to_bits();
             let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
             (u64::from(ordered) << 32 | u64::from(!id32(self.point(candidate))), candidate)
         })
@@ -242,37 +229,27 @@ impl CandidateBlocks {
         all.flat_map(move |(n, block)| Bits(of(block)).map(move |lane| Candidate(id32(n * WIDTH + lane))))
     }
 
-    /// The candidate that comes first. O(n), as the next ones.
-    pub(crate) fn first(&self, level: Level, rank: Rank) -> Option<Candidate> {
+    /// The candidate with the greatest bound of its depth, among those before or behind the surface whose place
+    /// is not known. O(n), as the next ones.
+    pub(crate) fn first(&self, level: Level, is_front: bool) -> Option<Candidate> {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.first_by(simd, rank),
+            || self.first_by(simd, is_front),
         ))
     }
 
     #[inline(always)]
-    fn first_by<S: Simd>(&self, simd: S, rank: Rank) -> Option<Candidate> {
-        let mut greatest = f32x16::splat(simd, f32::NEG_INFINITY);
-        for block in &self.0 {
-            let numbers = f32x16::load_array_ref(simd, block.numbers(rank));
-            greatest = greatest.max(among(simd, numbers, block.ranked(rank)));
+    fn first_by<S: Simd>(&self, simd: S, is_front: bool) -> Option<Candidate> {
+        let mut furthest = Greatest::none(simd);
+        for (number, block) in (0..).zip(&self.0) {
+            let most = f32x16::load_array_ref(simd, &block.most);
+            furthest.offer(simd, among(simd, most, block.by_depth(is_front)), (number, block.first));
         }
-        let greatest = greatest.reduce_max();
-        let (mut least, mut first) = (u32::MAX, None);
-        for (n, block) in self.0.iter().enumerate() {
-            let numbers = f32x16::load_array_ref(simd, block.numbers(rank));
-            let is_greatest: mask32x16<S> = numbers.simd_eq(greatest);
-            let Some(lane) = Bits(bits(is_greatest) & block.ranked(rank)).next() else { continue };
-            let i = block.first + id32(lane);
-            if i < least {
-                (least, first) = (i, Some(Candidate(id32(n * WIDTH + lane))));
-            }
-        }
-        first
+        furthest.candidate()
     }
 
-    /// Measures the distances from a contact of the point `own`, and removes the candidates that are not
-    /// apart from it. O(n).
+    /// Measures the distances from a contact of the point `own`, which is no longer a candidate. Those that
+    /// are not apart from it no longer have a rank by distance. O(n).
     pub(crate) fn separate(&mut self, level: Level, at: [f32; 3], own: usize) {
         let own = id32(own);
         dispatch!(level, simd => simd.vectorize(
@@ -287,10 +264,61 @@ impl CandidateBlocks {
             let away_sq = squared(seen_from(simd, &block.centres, at));
             let away_sq = away_sq.min(f32x16::load_array_ref(simd, &block.away_sq));
             block.away_sq = away_sq.to_array();
-            let is_apart: mask32x16<S> = away_sq.simd_ge(f32x16::load_array_ref(simd, &block.apart_sq));
             let is_own = 1_u32.checked_shl(own.wrapping_sub(block.first)).unwrap_or(0);
-            block.lanes &= bits(is_apart) & !is_own;
+            block.lanes &= !is_own;
         }
+    }
+
+    /// Measures the distances from contacts anew. Adds up to `wanted` candidates to `chosen`, each of which is
+    /// the furthest from the contacts and those before. They no longer are candidates. O(n) each.
+    pub(crate) fn choose(
+        &mut self,
+        level: Level,
+        contacts: &[[f32; 3]],
+        (wanted, chosen): (usize, &mut Vec<Candidate>),
+    ) {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.choose_by(simd, contacts, (wanted, chosen)),
+        ));
+    }
+
+    #[inline(always)]
+    fn choose_by<S: Simd>(
+        &mut self,
+        simd: S,
+        contacts: &[[f32; 3]],
+        (wanted, chosen): (usize, &mut Vec<Candidate>),
+    ) {
+        let mut last = None;
+        for _ in 0..wanted {
+            let mut furthest = Greatest::none(simd);
+            for (number, block) in (0..).zip(&mut self.0) {
+                let mut away_sq = f32x16::load_array_ref(simd, &block.away_sq);
+                if last.is_none() {
+                    away_sq = f32x16::splat(simd, f32::INFINITY);
+                    for &at in contacts {
+                        away_sq = away_sq.min(squared(seen_from(simd, &block.centres, at)));
+                    }
+                }
+                if let Some(at) = last {
+                    away_sq = away_sq.min(squared(seen_from(simd, &block.centres, at)));
+                }
+                block.away_sq = away_sq.to_array();
+                let apart = block.lanes & block.apart(simd);
+                furthest.offer(simd, among(simd, away_sq, apart), (number, block.first));
+            }
+            let Some(first) = furthest.candidate() else { return };
+            self.remove(first);
+            last = Some(self.centre(first));
+            chosen.push(first);
+        }
+    }
+
+    /// The centre of a candidate.
+    fn centre(&self, candidate: Candidate) -> [f32; 3] {
+        let (block, lane) = self.at(candidate);
+        [0, 1, 2].map(|k| block.centres[k][lane])
     }
 
     /// The first point at a border of a sheet for which [`Self::look_at`] was not called.
@@ -358,7 +386,8 @@ impl CandidateBlocks {
         let (mut best, mut nearest) = ((f32::INFINITY, u32::MAX), None);
         for (n, block) in self.0.iter().enumerate() {
             let excepted = |&i: &u32| 1_u32.checked_shl(i.wrapping_sub(block.first)).unwrap_or(0);
-            let lanes = block.lanes & !except.iter().map(excepted).fold(0, |all, own| all | own);
+            let lanes =
+                block.lanes & block.apart(simd) & !except.iter().map(excepted).fold(0, |all, own| all | own);
             let away_sq = squared(seen_from(simd, &block.centres, at));
             let least = -among(simd, -away_sq, lanes).reduce_max();
             let is_least: mask32x16<S> = away_sq.simd_eq(least);
@@ -379,6 +408,50 @@ impl CandidateBlocks {
         };
         let found = self.0.iter().enumerate().find_map(|(n, block)| Some((n, holds(block)?)));
         found.map(|(n, lane)| Candidate(id32(n * WIDTH + lane)))
+    }
+}
+
+/// The greatest number of each lane, its block, and the first point of that.
+struct Greatest<S: Simd> {
+    numbers: f32x16<S>,
+    blocks: u32x16<S>,
+    firsts: u32x16<S>,
+}
+
+impl<S: Simd> Greatest<S> {
+    #[inline(always)]
+    fn none(simd: S) -> Self {
+        Self {
+            numbers: f32x16::splat(simd, f32::NEG_INFINITY),
+            blocks: u32x16::splat(simd, 0),
+            firsts: u32x16::splat(simd, u32::MAX),
+        }
+    }
+
+    /// Compares the numbers of a block. Of equal ones that of the first point counts.
+    #[inline(always)]
+    fn offer(&mut self, simd: S, numbers: f32x16<S>, (block, first): (u32, u32)) {
+        let (block, first) = (u32x16::splat(simd, block), u32x16::splat(simd, first));
+        let (is_greater, is_equal): (mask32x16<S>, mask32x16<S>) =
+            (numbers.simd_gt(self.numbers), numbers.simd_eq(self.numbers));
+        let is_before: mask32x16<S> = first.simd_lt(self.firsts);
+        let is_first = is_greater | (is_equal & is_before);
+        self.numbers = numbers.max(self.numbers);
+        self.blocks = is_first.select(block, self.blocks);
+        self.firsts = is_first.select(first, self.firsts);
+    }
+
+    /// The candidate with the greatest number. `None` if that is negative infinity.
+    #[inline(always)]
+    fn candidate(&self) -> Option<Candidate> {
+        let greatest = self.numbers.reduce_max();
+        if greatest == f32::NEG_INFINITY {
+            return None;
+        }
+        let is_greatest: mask32x16<S> = self.numbers.simd_eq(greatest);
+        let (blocks, firsts) = (self.blocks.to_array(), self.firsts.to_array());
+        let lane = Bits(bits(is_greatest)).min_by_key(|&lane| firsts[lane] + id32(lane))?;
+        Some(Candidate(blocks[lane] * id32(WIDTH) + id32(lane)))
     }
 }
 
@@ -431,35 +504,87 @@ mod tests {
                 });
                 found.push(CandidateBlock { away_sq: numbers.map(f32::abs), ..block });
             }
-            for rank in [Rank::Depth { is_front: true }, Rank::Depth { is_front: false }, Rank::Distance] {
-                let all = found.lanes(|block| block.ranked(rank));
+            for is_front in [true, false] {
+                let all = found.lanes(|block| block.by_depth(is_front));
                 let mut expected: Vec<(f32, usize)> = all
                     .map(|candidate| {
                         let (block, lane) = found.at(candidate);
-                        (block.numbers(rank)[lane], found.point(candidate))
+                        (block.most[lane], found.point(candidate))
                     })
                     .collect();
                 expected.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
                 let expected: Vec<usize> = expected.into_iter().map(|(_, i)| i).collect();
-                let heap: BinaryHeap<(u64, Candidate)> = found.ordered(rank).collect();
+                let heap: BinaryHeap<(u64, Candidate)> = found.ordered(is_front).collect();
                 let ordered: Vec<usize> = heap
                     .into_sorted_vec()
                     .iter()
                     .rev()
                     .map(|&(_, candidate)| found.point(candidate))
                     .collect();
-                assert_eq!(ordered, expected, "round {round}, {rank:?}");
+                assert_eq!(ordered, expected, "round {round}, {is_front}");
                 for level in levels() {
                     let mut left = found.clone();
                     let one_by_one: Vec<usize> = std::iter::from_fn(|| {
-                        let candidate = left.first(level, rank)?;
+                        let candidate = left.first(level, is_front)?;
                         left.remove(candidate);
                         Some(left.point(candidate))
                     })
                     .collect();
-                    assert_eq!(one_by_one, expected, "round {round}, {rank:?}, {level:?}");
+                    assert_eq!(one_by_one, expected, "round {round}, {is_front}, {level:?}");
                 }
             }
         }
+    }
+
+    /// Each candidate that is chosen is the furthest from contacts and those before, and the first point of
+    /// equal ones, in any order of the blocks.
+    #[test]
+    fn the_furthest_candidates_are_chosen() {
+        let rng = &mut rng(7367);
+        let mut counts = [0; 10];
+        for round in 0..300 {
+            let mut firsts: Vec<usize> = (0..rng.random_range(1..6)).map(|n| n * WIDTH).collect();
+            let by = rng.random_range(0..firsts.len());
+            firsts.rotate_left(by);
+            // Places of a grid, many of which are equally far apart.
+            let steps: u8 = [4, 10][round % 2];
+            let mut place = || [(); 3].map(|()| f32::from(rng.random_range(0..steps)));
+            let contacts = [place(), place(), place()];
+            let contacts = &contacts[..round % 4];
+            let (mut found, mut all) = (CandidateBlocks::default(), Vec::new());
+            for &first in &firsts {
+                let places = [(); WIDTH].map(|()| place());
+                let lanes = CandidateLanes { found: 0xb7ff, missed: 0, turned: 0, borders: 0, behind: 0 };
+                all.extend(Bits(lanes.found).map(|lane| (first + lane, places[lane])));
+                let centres = [0, 1, 2].map(|k| places.map(|place| place[k]));
+                found.push(dispatch!(Level::new(), simd => {
+                    let apart = f32x16::splat(simd, 2.0);
+                    CandidateBlock::new(first, lanes, centres, [apart, apart])
+                }));
+            }
+            all.sort_by_key(|&(i, _)| i);
+            let (mut taken, mut expected) = (contacts.to_vec(), Vec::new());
+            for _ in 0..9 {
+                let mut best: Option<(f32, usize, [f32; 3])> = None;
+                for &(i, place) in &all {
+                    let apart = |at: &[f32; 3]| (0..3).map(|k| (place[k] - at[k]).powi(2)).sum::<f32>();
+                    let away = taken.iter().map(apart).fold(f32::INFINITY, f32::min);
+                    if away >= 4.0 && best.is_none_or(|best| away > best.0) && !expected.contains(&i) {
+                        best = Some((away, i, place));
+                    }
+                }
+                let Some((_, i, place)) = best else { break };
+                expected.push(i);
+                taken.push(place);
+            }
+            counts[expected.len()] += 1;
+            for level in levels() {
+                let (mut left, mut chosen) = (found.clone(), Vec::new());
+                left.choose(level, contacts, (9, &mut chosen));
+                let chosen: Vec<usize> = chosen.into_iter().map(|candidate| left.point(candidate)).collect();
+                assert_eq!(chosen, expected, "round {round}, {level:?}");
+            }
+        }
+        assert!(counts[9] > 100 && counts[..9].iter().sum::<usize>() > 50, "{counts:?} by number");
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Each disc that the shape touches can give one contact, the deepest place of the shape over the disc.
 //! Each ball can give one along the way from its centre. The deepest is selected first, then those that
-//! continue contacts of the last frame, then always the one whose disc or ball is furthest from those
-//! selected. A shape may touch hundreds of discs, so a place is computed only where the selection
+//! continue contacts of the last frame, then those whose discs or balls are furthest from each other. A shape
+//! may touch hundreds of discs, so a place is computed only where the selection
 //! depends on it: the bounds of [`gather`](crate::solid::gather) tell where the deepest may be.
 
 use std::cmp::Ordering;
@@ -17,7 +17,7 @@ use nearmiss_lanes::id32;
 use crate::ask::options::Detail;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
-use crate::solid::candidates::{Candidate, CandidateBlocks, Rank, single};
+use crate::solid::candidates::{Candidate, CandidateBlocks, single};
 use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
@@ -25,6 +25,7 @@ use crate::solid::ends::SheetEnds;
 use crate::solid::gather::{Gather, SPREAD};
 use crate::solid::hint::{MOST, ShapeHint};
 use crate::solid::place::{Place, most_depth, place_at, place_beside};
+use crate::solid::places::{LANES, places_at};
 use crate::solid::probe::is_far;
 use crate::solid::refine::refine;
 use crate::solid::sides::Sides;
@@ -48,6 +49,7 @@ const SLIDES: u32 = 3;
 pub(crate) struct Candidates {
     found: CandidateBlocks,
     places: Vec<Met>,
+    chosen: Vec<Candidate>,
     order: BinaryHeap<(u64, Candidate)>,
     ends: SheetEnds,
 }
@@ -70,6 +72,8 @@ struct Selection<'s, 'a> {
     level: Level,
     found: &'s mut CandidateBlocks,
     places: &'s mut Vec<Met>,
+    /// Candidates whose places are computed at once.
+    chosen: &'s mut Vec<Candidate>,
     /// The candidates in order, once so many have been tried.
     order: &'s mut BinaryHeap<(u64, Candidate)>,
     /// The number of candidates that have been tried by the same rank.
@@ -92,7 +96,7 @@ pub(crate) fn contacts(
         let own = hint.as_deref().and_then(|hint| hint.centre);
         let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
         let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
-        let Candidates { found, places, order, ends } = candidates;
+        let Candidates { found, places, chosen, order, ends } = candidates;
         found.clear();
         places.clear();
         // About a longer core the clearance of the centre rarely tells more than the list of boxes.
@@ -112,6 +116,7 @@ pub(crate) fn contacts(
             level,
             found,
             places,
+            chosen,
             order,
             tries: 0,
             taken: [None; MOST],
@@ -158,13 +163,8 @@ impl Selection<'_, '_> {
             None => self.taken[0] = self.beside(),
             Some(number) => {
                 self.take(number);
-                for known in hint.into_iter().flat_map(ShapeHint::contacts_of_points) {
-                    self.continue_from(known);
-                }
-                while self.count < MOST {
-                    let Some(number) = self.furthest() else { break };
-                    self.take(number);
-                }
+                self.continue_all(hint);
+                self.spread_out();
             }
         }
     }
@@ -185,12 +185,39 @@ impl Selection<'_, '_> {
             return Some(number);
         }
         let i = self.found.point(candidate);
-        let Some(place) = place_at(self.elements, self.solid, i, self.found.sign(candidate)) else {
+        let place = place_at(self.elements, self.solid, i, self.found.sign(candidate));
+        self.keep(candidate, place)
+    }
+
+    /// Computes the places of the chosen candidates at once, at most [`LANES`].
+    fn prepare(&mut self) {
+        let mut points = [(0, 0.0); LANES];
+        let mut count = 0;
+        for &candidate in self.chosen.iter() {
+            if self.found.place(candidate).is_none() {
+                points[count] = (self.found.point(candidate), self.found.sign(candidate));
+                count += 1;
+            }
+        }
+        let (elements, solid, level) = (self.elements, self.solid, self.level);
+        let mut n = 0;
+        places_at(elements, solid, level, &points[..count], |place| {
+            while self.found.place(self.chosen[n]).is_some() {
+                n += 1;
+            }
+            self.keep(self.chosen[n], place);
+            n += 1;
+        });
+    }
+
+    /// Keeps the place of a candidate, and returns its number. Removes the candidate if it has none.
+    fn keep(&mut self, candidate: Candidate, place: Option<Place>) -> Option<usize> {
+        let Some(place) = place else {
             self.found.miss(candidate);
             return None;
         };
         let number = self.places.len();
-        self.places.push(Met::new(self.elements, i, &place));
+        self.places.push(Met::new(self.elements, self.found.point(candidate), &place));
         self.found.set_place(candidate, number);
         Some(number)
     }
@@ -200,7 +227,7 @@ impl Selection<'_, '_> {
     fn deepest(&mut self, is_front: bool) -> Option<usize> {
         let mut best: Option<usize> = None;
         self.tries = 0;
-        while let Some(candidate) = self.next(Rank::Depth { is_front }) {
+        while let Some(candidate) = self.next(is_front) {
             if let Some(Met { contact, band, .. }) = best.map(|best| &self.places[best]) {
                 let scale = self.elements.scale();
                 if (contact.depth + LEVEL * band) / scale >= self.found.most(candidate) {
@@ -224,17 +251,29 @@ impl Selection<'_, '_> {
         best
     }
 
-    /// Returns the next candidate. The caller computes its place, removes it or lowers its bound.
-    fn next(&mut self, rank: Rank) -> Option<Candidate> {
+    /// Returns the next candidate by its depth. The caller computes its place, or lowers its bound.
+    fn next(&mut self, is_front: bool) -> Option<Candidate> {
         self.tries += 1;
         if self.tries <= SCANS {
-            return self.found.first(self.level, rank);
+            return self.found.first(self.level, is_front);
         }
         if self.tries == SCANS + 1 {
             self.order.clear();
-            self.order.extend(self.found.ordered(rank));
+            self.order.extend(self.found.ordered(is_front));
         }
         self.order.pop().map(|(_, candidate)| candidate)
+    }
+
+    /// Takes places that continue contacts of the last frame.
+    fn continue_all(&mut self, hint: Option<&ShapeHint>) {
+        let Some(hint) = hint else { return };
+        self.chosen.clear();
+        let points = hint.contacts_of_points().filter_map(|(_, point)| self.found.of_point(point));
+        self.chosen.extend(points);
+        self.prepare();
+        for known in hint.contacts_of_points() {
+            self.continue_from(known);
+        }
     }
 
     /// Takes the place of a candidate that continues a contact of the last frame: of the same point or,
@@ -268,16 +307,31 @@ impl Selection<'_, '_> {
         }
     }
 
-    /// Returns the number of the place of the furthest disc or ball from all contacts.
-    fn furthest(&mut self) -> Option<usize> {
-        self.tries = 0;
-        loop {
-            let candidate = self.next(Rank::Distance)?;
-            if let Some(own) = self.place(candidate) {
-                if self.is_free(own) {
-                    return Some(own);
+    /// Takes further contacts, in rounds. A round chooses the disc or ball that is furthest from all contacts,
+    /// then always the one furthest from these and from those chosen. One more is chosen than there is room
+    /// for, as some have no place, or one that is not apart from a contact.
+    fn spread_out(&mut self) {
+        while self.count < MOST {
+            let (wanted, before) = (MOST - self.count + 1, self.count);
+            let mut contacts = [[0.0; 3]; MOST];
+            for (at, met) in contacts.iter_mut().zip(self.taken.iter().flatten()) {
+                *at = single(&met.at);
+            }
+            self.chosen.clear();
+            self.found.choose(self.level, &contacts[..before], (wanted, &mut *self.chosen));
+            self.prepare();
+            for n in 0..self.chosen.len() {
+                if let Some(own) = self.found.place(self.chosen[n])
+                    && self.count < MOST
+                    && self.is_free(own)
+                {
+                    self.taken[self.count] = Some(self.places[own]);
+                    self.count += 1;
                 }
-                self.found.remove(candidate);
+            }
+            // Those beside a candidate that was not taken come back.
+            if self.chosen.len() < wanted && self.count - before == self.chosen.len() {
+                return;
             }
         }
     }
@@ -289,7 +343,7 @@ impl Selection<'_, '_> {
         self.taken.iter().flatten().all(|other| (other.at - at).norm_squared() >= least * least)
     }
 
-    /// Adds a place to the contacts. Removes the candidates that are not apart from it.
+    /// Adds a place to the contacts.
     fn take(&mut self, own: usize) {
         let met = self.places[own];
         self.taken[self.count] = Some(met);
@@ -369,7 +423,7 @@ mod tests {
         let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
         let r = scan.sampling_radius();
         let rng = &mut rng(77);
-        let (mut full, mut past) = (0, 0);
+        let (mut full, mut past, mut spread) = (0, 0, Vec::new());
         for round in 0..1200 {
             let options = CollideOptions::estimated().with_detail(Detail::Verdict);
             let options = options.with_margin([0.0, 0.3 * r][round % 2]);
@@ -424,27 +478,56 @@ mod tests {
                 assert_eq!(all[n].contact, *contact, "{name}, round {round}");
                 all[n]
             };
-            // Each further one is the disc or ball furthest from those before.
             let taken: Vec<Met> = out.iter().map(own).collect();
-            for n in 1..=out.len().min(MOST - 1) {
-                let before = &taken[..n];
-                let away = |x: Vector| before.iter().map(|it| (x - it.at).norm()).fold(f64::MAX, f64::min);
-                let centre_of = |met: &Met| elements.position(met.i);
-                let reach = taken.get(n).map_or(0.0, |next| away(centre_of(next)));
-                for other in &near {
-                    let least = f64::from(SPREAD * elements.arrays.radii[other.i]);
-                    let is_free = away(other.at).min(away(centre_of(other))) > least * (1.0 + 1e-4);
-                    let is_taken = taken.iter().any(|it| it.i == other.i);
-                    assert!(
-                        is_taken || !is_free || away(centre_of(other)) <= reach * (1.0 + 1e-4),
-                        "{name}, round {round}: {:?} is further than contact {n}, {other:?}",
-                        away(centre_of(other))
-                    );
-                }
+            let free = Free { elements: &elements, near: &near };
+            if taken.len() < MOST {
+                let left = free.next(&taken);
+                assert!(left.is_none(), "{name}, round {round}: room for {left:?}");
             }
+            spread.push([free.gap(&taken), free.gap(&free.one_by_one(taken[0]))]);
             full += usize::from(out.len() == MOST);
         }
         assert!(past > 100, "{past} places past ends of {name}");
+        // A round that chooses by centres leaves about the gaps that one by one leaves.
+        let [rounds, one_by_one] = [0, 1].map(|k| spread.iter().map(|gaps| gaps[k]).sum::<f64>());
+        assert!(rounds <= 1.02 * one_by_one, "{name}: gaps of {rounds}, one by one {one_by_one}");
         full
+    }
+
+    /// Places among which contacts are selected.
+    struct Free<'s, 'a> {
+        elements: &'s Elements<'a>,
+        near: &'s [Met],
+    }
+
+    impl Free<'_, '_> {
+        /// The place that is apart from all contacts whose disc or ball is furthest from them.
+        fn next(&self, taken: &[Met]) -> Option<Met> {
+            let apart = |met: &Met| {
+                let centre = self.elements.position(met.i);
+                let away = |x: Vector| taken.iter().map(|it| (x - it.at).norm()).fold(f64::MAX, f64::min);
+                let of_centres = taken.iter().map(|it| (centre - self.elements.position(it.i)).norm());
+                let least = f64::from(SPREAD * self.elements.arrays.radii[met.i]) * (1.0 + 1e-4);
+                let away = [away(met.at), away(centre), of_centres.fold(f64::MAX, f64::min)];
+                (away.into_iter().fold(f64::MAX, f64::min) > least).then_some((away[1], *met))
+            };
+            self.near.iter().filter_map(apart).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, met)| met)
+        }
+
+        /// The contacts that are selected one by one.
+        fn one_by_one(&self, deepest: Met) -> Vec<Met> {
+            let mut taken = vec![deepest];
+            while taken.len() < MOST {
+                let Some(next) = self.next(&taken) else { break };
+                taken.push(next);
+            }
+            taken
+        }
+
+        /// The greatest distance of a place from the nearest contact.
+        fn gap(&self, taken: &[Met]) -> f64 {
+            let away = |met: &Met| taken.iter().map(|it| (met.at - it.at).norm()).fold(f64::MAX, f64::min);
+            self.near.iter().map(away).fold(0.0, f64::max)
+        }
     }
 }

@@ -9,14 +9,12 @@
 //! x = R σ / √(σ² + u² (1 − d²/e²)),
 //!
 //! whose right side decreases in e and is convex. So Newton's method that starts at too small an e never
-//! goes past the zero.
+//! goes past the zero. The same code computes one place, or eight in SIMD lanes.
 
-use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_lanes::lane::{Lane, difference, dot, sum};
 
-use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::Solid;
-
-type Vector = Vector3<f64>;
+use crate::solid::discs::{Discs, Over};
 
 /// Steps of Newton's method; three are enough in the mean.
 const ROUNDS: u32 = 16;
@@ -30,106 +28,112 @@ const ROUNDING: f64 = 1e-9;
 /// The square of the sine of the angle of a segment and the axis of a disc below which they are parallel.
 const UPRIGHT_SQ: f64 = 1e-24;
 
-/// The point of a segment about which a sphere reaches deepest over a disc.
+/// A capsule: its centre, the way from there to an end, and its radius.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Deepest {
-    /// The height of the point above the plane of the disc.
-    pub(crate) height: f64,
-    /// Its distance from the cylinder over the disc, across the axis of the disc.
-    pub(crate) beside: f64,
-    /// The point of the disc over which the sphere is deepest.
-    pub(crate) on_disc: Vector,
+pub(crate) struct Capsule {
+    pub(crate) centre: [f64; 3],
+    pub(crate) edge: [f64; 3],
+    pub(crate) radius: f64,
 }
 
-impl Solid<'_> {
-    /// The deepest place of a shape whose core is a point or a segment, against `out`, over a disc with that
-    /// axis. `None` if no part of the shape is over the disc. O(1).
-    pub(crate) fn deepest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Deepest> {
-        Deepest::of_capsule((self.centre, self.axes[0] * self.half.x), self.radius, (disc, out))
+impl Capsule {
+    /// The shape, whose core must be a point or a segment.
+    pub(crate) fn of(solid: &Solid<'_>) -> Self {
+        let edge = solid.axes[0] * solid.half.x;
+        Self { centre: solid.centre.into(), edge: edge.into(), radius: solid.radius }
+    }
+
+    /// The deepest places over discs.
+    #[inline(always)]
+    pub(crate) fn over<L: Lane>(&self, discs: &Discs<L>) -> Over<L> {
+        let Discs { centre, out, radius: disc } = *discs;
+        let (zero, radius) = (disc.splat(0.0), disc.splat(self.radius));
+        let from = difference(disc.splat_all(self.centre), centre);
+        let edge = disc.splat_all(self.edge);
+        let (middle, rise) = (dot(out, from), dot(out, edge));
+        // To the lower end.
+        let is_up = zero.is_less(rise);
+        let edge = L::select_all(is_up, [-edge[0], -edge[1], -edge[2]], edge);
+        let fall = rise.abs();
+        let from = difference(from, middle.scale_all(out));
+        let way = sum(edge, fall.scale_all(out));
+        let share = deepest_share(&from, &way, fall, [disc, radius]);
+        let across = sum(from, share.scale_all(way));
+        let away = dot(across, across).sqrt();
+        let beside = away - disc;
+        let is_beside = zero.is_less(beside);
+        let inwards = L::select(is_beside, disc / away, disc.splat(1.0));
+        let is_over = beside.is_at_most(radius + disc * ROUNDING);
+        let beside = beside.within(0.0, self.radius);
+        let height = middle - fall * share;
+        Over {
+            is_over,
+            on_disc: sum(centre, inwards.scale_all(across)),
+            depth: (radius * radius - beside * beside).sqrt() - height,
+            is_beside,
+            apart: (height * height + beside * beside).sqrt(),
+        }
     }
 }
 
-impl Deepest {
-    /// The deepest place of a capsule, given by its centre, the way from there to an end, and its radius,
-    /// against `out` over a disc with that axis. `None` if no part of the capsule is over the disc.
-    pub(crate) fn of_capsule(
-        (centre, edge): (Vector, Vector),
-        radius: f64,
-        (disc, out): (&FlatDisc, &Vector),
-    ) -> Option<Self> {
-        let from = centre - disc.centre;
-        let (middle, rise) = (out.dot(&from), out.dot(&edge));
-        let (edge, fall) = if rise > 0.0 { (-edge, rise) } else { (edge, -rise) };
-        let (from, way) = (from - out * middle, edge + out * fall);
-        let share = deepest_share(&from, &way, fall, [disc.radius, radius]);
-        let across = from + way * share;
-        let away = across.norm();
-        let beside = away - disc.radius;
-        let inwards = if beside > 0.0 { disc.radius / away } else { 1.0 };
-        (beside <= radius + ROUNDING * disc.radius).then(|| Self {
-            height: middle - fall * share,
-            beside: beside.clamp(0.0, radius),
-            on_disc: disc.centre + across * inwards,
-        })
-    }
-
-    /// The depth below the plane of the disc that the sphere of this radius about the point reaches.
-    pub(crate) fn depth(&self, radius: f64) -> f64 {
-        (radius * radius - self.beside * self.beside).sqrt() - self.height
-    }
-}
-
-/// The place on a segment, from −1 at the upper end to 1 at the lower one, about which a sphere reaches
-/// deepest over a disc. `from` and `way` are across the axis of the disc: from there to the middle of the
-/// segment, and from there to the lower end, which is `fall` lower. The radii are those of the disc and of
-/// the sphere.
-fn deepest_share(from: &Vector, way: &Vector, fall: f64, [disc, radius]: [f64; 2]) -> f64 {
-    let low_sq = (from + way).norm_squared();
-    let square = way.norm_squared();
-    if low_sq <= disc * disc || square <= UPRIGHT_SQ * fall * fall {
-        return 1.0;
-    }
-    let nearest = -from.dot(way) / square;
-    if nearest >= 1.0 {
-        return 1.0;
+/// The places on segments, from −1 at the upper end to 1 at the lower one, about which spheres reach deepest
+/// over discs. `from` and `way` are across the axis of the disc: from there to the middle of the segment, and
+/// from there to the lower end, which is `fall` lower. The radii are those of the disc and of the sphere.
+#[inline(always)]
+fn deepest_share<L: Lane>(from: &[L; 3], way: &[L; 3], fall: L, [disc, radius]: [L; 2]) -> L {
+    let (zero, one) = (fall.splat(0.0), fall.splat(1.0));
+    let low = sum(*from, *way);
+    let (low_sq, square) = (dot(low, low), dot(*way, *way));
+    let nearest = -dot(*from, *way) / square;
+    // The lower end is the deepest place.
+    let mut is_low = low_sq.is_at_most(disc * disc)
+        | square.is_at_most(fall * fall * UPRIGHT_SQ)
+        | one.is_at_most(nearest);
+    if !L::any(!is_low) {
+        return one;
     }
     // Distances from the axis: the least one of the line, and that of the place.
-    let least = (from + way * nearest).norm();
+    let at_least = sum(*from, nearest.scale_all(*way));
+    let least = dot(at_least, at_least).sqrt();
     let (pull, fall_sq) = (radius * fall, fall * fall);
-    let mut away = least.max(disc + pull / (square + fall_sq).sqrt());
+    let mut away = least.greater(disc + pull / (square + fall_sq).sqrt());
     // The square of the way across between the two.
-    let beyond_sq = |away: f64| ((away - least) * (away + least)).max(0.0);
+    let beyond_sq = |away: L| ((away - least) * (away + least)).greater(zero);
     let bend = pull * square * least * least;
+    let mut is_open = !is_low;
     for _ in 0..ROUNDS {
         let (away_sq, way_sq) = (away * away, beyond_sq(away));
-        if away_sq >= low_sq {
-            return 1.0;
-        }
+        is_low = is_low | (is_open & low_sq.is_at_most(away_sq));
         // The radicand times e², so that a step takes one root and one division.
         let slope_sq = fall_sq * away_sq + square * way_sq;
         let slope = slope_sq.sqrt();
         let step = ((disc - away) * slope + pull * away) * slope_sq / (slope_sq * slope + bend);
-        // If a level segment is beside the disc, the slope is 0.
-        if step.is_nan() || step <= 0.0 {
-            break;
-        }
-        away += step;
+        // If a level segment is beside the disc, the slope is 0, and the step is not a number.
+        is_open = is_open & !is_low & zero.is_less(step);
+        away = L::select(is_open, away + step, away);
         // The place moves by step × away / way.
-        if (step * away).powi(2) <= (PRECISION * disc).powi(2) * way_sq {
+        let (moved, most) = (step * away, disc * PRECISION);
+        is_open = is_open & !(moved * moved).is_at_most(most * most * way_sq);
+        if !L::any(is_open) {
             break;
         }
     }
-    (nearest + (beyond_sq(away) / square).sqrt()).clamp(-1.0, 1.0)
+    let share = (nearest + (beyond_sq(away) / square).sqrt()).within(-1.0, 1.0);
+    L::select(is_low, one, share)
 }
 
 #[cfg(test)]
 mod tests {
     use nearmiss_geometry::Pose;
+    use nearmiss_geometry::nalgebra::Vector3;
     use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
     use rand::RngExt;
 
     use super::*;
+    use crate::leaf::disc_triangle::FlatDisc;
     use crate::solid::shape::Shape;
+
+    type Vector = Vector3<f64>;
 
     /// The greatest depth over a disc of spheres about the points of a segment: concave where it is defined.
     fn searched(solid: &Solid<'_>, disc: &FlatDisc, out: &Vector) -> Option<f64> {
@@ -198,7 +202,8 @@ mod tests {
             let disc_radius = [0.02, 0.2, 1.0][(round / 4) % 3] * size;
             let disc =
                 FlatDisc { centre: Vector::from(point_in(rng, 0.5 * size)), normal, radius: disc_radius };
-            let (found, expected) = (solid.deepest_over(&disc, &normal), searched(&solid, &disc, &normal));
+            let found = Capsule::of(&solid).over(&Discs::of(&disc, &normal));
+            let (found, expected) = (Some(found).filter(|it| it.is_over), searched(&solid, &disc, &normal));
             let (Some(found), Some(expected)) = (found, expected) else {
                 beside += 1;
                 assert_eq!(
@@ -209,16 +214,16 @@ mod tests {
                 continue;
             };
             over += 1;
-            at_rims += usize::from(found.beside > 0.0);
-            let depth = (radius * radius - found.beside * found.beside).sqrt() - found.height;
+            at_rims += usize::from(found.is_beside);
+            let depth = found.depth;
             // A place that is off along a steep flank is less deep in the first order.
             assert!(
                 (depth - expected).abs() <= 1e-6 * size,
                 "round {round}: {depth}, expected {expected}: {solid:?} {disc:?} {found:?}"
             );
-            let off = found.on_disc - disc.centre;
+            let off = Vector::from(found.on_disc) - disc.centre;
             assert!(off.norm() <= disc_radius + 1e-9 * size && normal.dot(&off).abs() <= 1e-9 * size);
-            let away = solid.distance(&(found.on_disc - normal * depth));
+            let away = solid.distance(&(Vector::from(found.on_disc) - normal * depth));
             assert!(away <= radius + 1e-7 * size, "round {round}: {away} {solid:?} {disc:?} {found:?}");
         }
         assert!(

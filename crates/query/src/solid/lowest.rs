@@ -1,120 +1,185 @@
-//! The lowest place of a box over a disc.
+//! The lowest place of a box over a disc. The same code computes one place, or eight in SIMD lanes.
 
-use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_lanes::lane::{Lane, difference, dot, sum};
 
-use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::Solid;
-
-type Vector = Vector3<f64>;
+use crate::solid::discs::{Discs, Over};
 
 /// The signs of the edges along an axis that may be lowest, times those of the lowest edge. The fourth edge
 /// is between two faces that look up.
 const EDGES: [[f64; 2]; 3] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]];
 
-impl Solid<'_> {
-    /// The lowest place, against `out`, of a core that is a box within the cylinder over a disc with that
-    /// axis. `None` if the core is something else, or is beside the cylinder.
-    pub(crate) fn lowest_over(&self, disc: &FlatDisc, out: &Vector) -> Option<Vector> {
-        if self.is_segment() || !self.is_box() {
-            return None;
-        }
-        // In the frame of the box.
-        let own = |v: &Vector| Vector::from(self.axes.map(|axis| axis.dot(v)));
-        let place = lowest_of_box(&self.half, (own(&(disc.centre - self.centre)), disc.radius), own(out))?;
-        Some((0..3).fold(self.centre, |x, k| x + self.axes[k] * place[k]))
-    }
+/// Slopes below this are level.
+const LEVEL: f64 = 1e-12;
+
+/// A box without a radius: its centre, its axes and half its lengths.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SharpBox {
+    pub(crate) centre: [f64; 3],
+    pub(crate) axes: [[f64; 3]; 3],
+    pub(crate) half: [f64; 3],
 }
 
-/// The lowest place, against `out`, of a box about the origin over a disc, given by its centre and radius:
-/// where a face that looks down is lowest, or on an edge.
-fn lowest_of_box(half: &Vector, (disc, radius): (Vector, f64), out: Vector) -> Option<Vector> {
-    /// Slopes below this are level.
-    const LEVEL: f64 = 1e-12;
-    // From the axis of the cylinder to the centre of the box.
-    let away = out * out.dot(&disc) - disc;
-    // The squares of the parts of the axes across the disc. Differences from one would lose what is small.
-    let squares = Vector::from([0, 1, 2].map(|k| {
-        let (a, b) = (out[(k + 1) % 3], out[(k + 2) % 3]);
-        a * a + b * b
-    }));
-    // The face across axis k that looks down, at the place of the rim where it is lowest. The box is above
-    // the plane of the face, so no other place is lower.
-    for k in 0..3 {
-        let (steep, slope) = (out[k].abs(), squares[k].sqrt());
-        if steep <= LEVEL {
-            continue;
-        }
-        let side = -1.0_f64.copysign(out[k]);
-        let mut beside = away;
-        if slope > LEVEL {
-            beside += out * (steep * radius / slope);
-            beside[k] = away[k] + side * slope * radius;
-        }
-        let place = out * ((half[k] + side * beside[k]) / -steep) - beside;
-        let is_on = |m: usize| place[m].abs() <= half[m];
-        if is_on((k + 1) % 3) && is_on((k + 2) % 3) {
-            return Some(place);
-        }
-    }
-    lowest_of_edges(half, (&away, radius), (&out, &squares))
+/// Discs in the frame of a box.
+struct Seen<L> {
+    out: [L; 3],
+    radius: L,
+    /// The way across each disc from its centre to that of the box.
+    away: [L; 3],
+    /// The squares of the parts of the axes across the disc. Differences from one would lose what is small.
+    squares: [L; 3],
 }
 
-/// The lowest place over a disc of this radius on an edge of a box. `away` is across the disc from its centre
-/// to that of the box, and `squares` are those of the parts of the axes across the disc.
-fn lowest_of_edges(
-    half: &Vector,
-    (away, radius): (&Vector, f64),
-    (out, squares): (&Vector, &Vector),
-) -> Option<Vector> {
-    // A height over the centre of the box, and the place in half edges from there.
-    let mut best: Option<(f64, Vector)> = None;
-    let (climbs, along) = (out.component_mul(half), away.component_mul(half));
-    let edges = squares.component_mul(half).component_mul(half);
-    let beyond = away.norm_squared() - radius * radius;
-    let low = out.map(|rise| -1.0_f64.copysign(rise));
-    for [a, b] in EDGES {
+impl SharpBox {
+    /// The core of a shape that is a box.
+    pub(crate) fn of(solid: &Solid<'_>) -> Self {
+        let axes = solid.axes.map(Into::into);
+        Self { centre: solid.centre.into(), axes, half: solid.half.into() }
+    }
+
+    /// The deepest places over discs.
+    #[inline(always)]
+    pub(crate) fn over<L: Lane>(&self, discs: &Discs<L>) -> Over<L> {
+        let (centre, out, radius) = (self.seen(discs.centre), self.turned(discs.out), discs.radius);
+        let [x, y, z] = out;
+        let away = difference(dot(out, centre).scale_all(out), centre);
+        let squares = [y * y + z * z, z * z + x * x, x * x + y * y];
+        let seen = Seen { out, radius, away, squares };
+        let (mut is_over, mut lowest) = self.lowest_of_faces(&seen);
+        if L::any(!is_over) {
+            let (is_on_edge, on_edges) = self.lowest_of_edges(&seen, !is_over);
+            lowest = L::select_all(is_over, lowest, on_edges);
+            is_over = is_over | is_on_edge;
+        }
+        let height = dot(out, difference(lowest, centre));
+        let foot = difference(lowest, height.scale_all(out));
+        let mut beyond = foot;
+        let mut on_disc = radius.splat_all(self.centre);
+        for k in 0..3 {
+            beyond[k] = (foot[k].abs() - self.half[k]).greater(radius.splat(0.0));
+            on_disc = sum(on_disc, foot[k].scale_all(radius.splat_all(self.axes[k])));
+        }
+        // The core ends at the surface of the shape, so a place over the disc is one of the core.
+        let is_beside = radius.is_less(radius);
+        Over { is_over, on_disc, depth: -height, is_beside, apart: dot(beyond, beyond).sqrt() }
+    }
+
+    /// A place in the frame of the box.
+    #[inline(always)]
+    fn seen<L: Lane>(&self, place: [L; 3]) -> [L; 3] {
+        self.turned(difference(place, place[0].splat_all(self.centre)))
+    }
+
+    /// A direction in the frame of the box.
+    #[inline(always)]
+    fn turned<L: Lane>(&self, v: [L; 3]) -> [L; 3] {
+        let [x, y, z] = self.axes;
+        let splat = |axis: [f64; 3]| v[0].splat_all(axis);
+        [dot(splat(x), v), dot(splat(y), v), dot(splat(z), v)]
+    }
+
+    /// The lowest places that are on faces that look down, and where there are any.
+    #[inline(always)]
+    fn lowest_of_faces<L: Lane>(&self, seen: &Seen<L>) -> (L::Mask, [L; 3]) {
+        let &Seen { out, radius, away, squares } = seen;
+        let (zero, one, level) = (radius.splat(0.0), radius.splat(1.0), radius.splat(LEVEL));
+        let mut is_found = zero.is_less(zero);
+        let mut lowest = [zero; 3];
+        // The face across axis k that looks down, at the place of the rim where it is lowest. The box is
+        // above the plane of the face, so no other place is lower.
         for k in 0..3 {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            let (a, b) = (a * low[i], b * low[j]);
-            let middle = climbs[i] * a + climbs[j] * b;
-            if best.is_some_and(|(least, _)| middle - climbs[k].abs() >= least) {
-                continue;
-            }
-            // The square of the distance from the axis, less that of the radius, along the edge.
-            let sides = a * along[i] + b * along[j] - a * b * climbs[i] * climbs[j];
-            let c = beyond + edges[i] + edges[j] + 2.0 * sides;
-            let h = along[k] - climbs[k] * middle;
-            let Some([low, high]) = least_range(edges[k], h, c) else { continue };
-            let mut place = Vector::zeros();
-            (place[i], place[j], place[k]) = (a, b, if out[k] < 0.0 { high } else { low });
-            let height = middle + climbs[k] * place[k];
-            if best.is_none_or(|(least, _)| height < least) {
-                best = Some((height, place));
+            let (steep, slope) = (out[k].abs(), squares[k].sqrt());
+            let side = L::select(zero.is_less(out[k]), -one, one);
+            let is_sloped = level.is_less(slope);
+            let tilted = L::select(is_sloped, steep * radius / slope, zero);
+            let mut beside = sum(away, tilted.scale_all(out));
+            beside[k] = L::select(is_sloped, away[k] + side * slope * radius, away[k]);
+            let climb = (side * beside[k] + self.half[k]) / -steep;
+            let place = difference(climb.scale_all(out), beside);
+            let is_on = level.is_less(steep)
+                & place[i].abs().is_at_most(radius.splat(self.half[i]))
+                & place[j].abs().is_at_most(radius.splat(self.half[j]));
+            lowest = L::select_all(is_found | !is_on, lowest, place);
+            is_found = is_found | is_on;
+            if !L::any(!is_found) {
+                break;
             }
         }
+        (is_found, lowest)
     }
-    best.map(|(_, place)| place.component_mul(half))
+
+    /// The lowest places on edges where `is_wanted`, and where there are any.
+    #[inline(always)]
+    fn lowest_of_edges<L: Lane>(&self, seen: &Seen<L>, is_wanted: L::Mask) -> (L::Mask, [L; 3]) {
+        let &Seen { out, radius, away, squares } = seen;
+        let (zero, one) = (radius.splat(0.0), radius.splat(1.0));
+        let (mut climbs, mut along, mut edges, mut low) = (out, away, squares, out);
+        for k in 0..3 {
+            let half = self.half[k];
+            (climbs[k], along[k], edges[k]) = (out[k] * half, away[k] * half, squares[k] * half * half);
+            low[k] = L::select(zero.is_less(out[k]), -one, one);
+        }
+        let beyond = dot(away, away) - radius * radius;
+        // Heights over the centre of the box, and the places in half edges from there.
+        let (mut least, mut lowest) = (radius.splat(f64::INFINITY), [zero; 3]);
+        let mut is_found = zero.is_less(zero);
+        for [a, b] in EDGES {
+            for k in 0..3 {
+                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+                let (a, b) = (low[i] * a, low[j] * b);
+                let middle = climbs[i] * a + climbs[j] * b;
+                let is_open = is_wanted & (middle - climbs[k].abs()).is_less(least);
+                if !L::any(is_open) {
+                    continue;
+                }
+                // The square of the distance from the axis, less that of the radius, along the edge.
+                let sides = a * along[i] + b * along[j] - a * b * climbs[i] * climbs[j];
+                let c = beyond + edges[i] + edges[j] + sides * 2.0;
+                let h = along[k] - climbs[k] * middle;
+                let (is_there, ends) = least_range(edges[k], h, c);
+                let mut place = [zero; 3];
+                (place[i], place[j]) = (a, b);
+                place[k] = L::select(out[k].is_less(zero), ends[1], ends[0]);
+                let height = middle + climbs[k] * place[k];
+                let is_lower = is_open & is_there & height.is_less(least);
+                least = L::select(is_lower, height, least);
+                lowest = L::select_all(is_lower, place, lowest);
+                is_found = is_found | is_lower;
+            }
+        }
+        for k in 0..3 {
+            lowest[k] = lowest[k] * self.half[k];
+        }
+        (is_found, lowest)
+    }
 }
 
-/// The part of −1..1 in which a x² + 2 h x + c is not positive, for a ≥ 0.
-fn least_range(a: f64, h: f64, c: f64) -> Option<[f64; 2]> {
-    if a == 0.0 {
-        return (c <= 0.0).then_some([-1.0, 1.0]);
-    }
+/// The parts of −1..1 in which a x² + 2 h x + c is not positive, for a ≥ 0, and where there is one.
+#[inline(always)]
+fn least_range<L: Lane>(a: L, h: L, c: L) -> (L::Mask, [L; 2]) {
+    let (zero, one) = (a.splat(0.0), a.splat(1.0));
+    let is_curved = zero.is_less(a);
     let square = h * h - a * c;
-    let root = if square >= 0.0 { square.sqrt() } else { return None };
-    let (low, high) = (((-h - root) / a).max(-1.0), ((-h + root) / a).min(1.0));
-    (low <= high).then_some([low, high])
+    let root = square.greater(zero).sqrt();
+    let low = L::select(is_curved, ((-h - root) / a).greater(-one), -one);
+    let high = L::select(is_curved, -((h - root) / a).greater(-one), one);
+    let is_there = is_curved & zero.is_at_most(square) & low.is_at_most(high);
+    (is_there | (!is_curved & c.is_at_most(zero)), [low, high])
 }
 
 #[cfg(test)]
 mod tests {
     use nearmiss_geometry::Pose;
+    use nearmiss_geometry::nalgebra::Vector3;
     use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
     use rand::RngExt;
 
     use super::*;
+    use crate::leaf::disc_triangle::FlatDisc;
     use crate::solid::shape::Shape;
+
+    type Vector = Vector3<f64>;
 
     /// The lowest height of a box over a disc, on lines through the cylinder in rings about its axis. A line
     /// is in the box where it is between the planes of all faces.
@@ -162,12 +227,14 @@ mod tests {
             let radius = [0.02, 0.2, 1.0][round % 3];
             let disc = FlatDisc { centre: point_in(rng, 1.0).into(), normal: out, radius };
             let height = |x: &Vector| out.dot(&(x - disc.centre));
-            let (found, expected) = (solid.lowest_over(&disc, &out), sampled(&solid, &disc, out));
-            let Some(lowest) = found else {
+            let found = SharpBox::of(&solid).over(&Discs::of(&disc, &out));
+            let expected = sampled(&solid, &disc, out);
+            let lowest = Vector::from(found.on_disc) - out * found.depth;
+            if !found.is_over {
                 beside += 1;
                 assert_eq!(expected, None, "round {round}: {solid:?} {disc:?}");
                 continue;
-            };
+            }
             over += 1;
             assert!(solid.distance(&lowest) < 1e-12, "round {round}: {solid:?} {disc:?} {lowest}");
             let away = (lowest - disc.centre - out * height(&lowest)).norm();

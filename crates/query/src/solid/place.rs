@@ -2,12 +2,15 @@
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointKind;
+use nearmiss_lanes::lane::Lane;
 
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::{Gap, Solid};
-use crate::solid::deepest::Deepest;
+use crate::solid::deepest::Capsule;
+use crate::solid::discs::{Discs, Over};
 use crate::solid::elements::{Element, Elements};
 use crate::solid::inner::inner_depth;
+use crate::solid::lowest::SharpBox;
 use crate::solid::portal::Lowest;
 
 type Vector = Vector3<f64>;
@@ -29,12 +32,12 @@ pub(crate) struct Place {
 }
 
 /// The deepest place of a shape over a disc.
-struct Over {
-    place: Place,
+pub(crate) struct Deepest {
+    pub(crate) place: Place,
     /// `true` if the core is beside the disc there.
-    is_beside: bool,
+    pub(crate) is_beside: bool,
     /// The core is at most this far from the disc if the place is not further before it than that.
-    apart: f64,
+    pub(crate) apart: f64,
 }
 
 /// The deepest place of a shape on the ball or over the disc of point `i`, whose normal in the direction in
@@ -78,9 +81,20 @@ pub(crate) fn over_disc(
     out: Vector,
     (most, margin): (f64, f64),
 ) -> Option<Place> {
-    let Over { place, is_beside, apart } = deepest(solid, disc, out)?;
+    within(solid, || *disc, deepest(solid, disc, out)?, (most, margin))
+}
+
+/// The deepest place over a disc, with the conditions of [`over_disc`].
+#[inline]
+pub(crate) fn within(
+    solid: &Solid<'_>,
+    disc: impl FnOnce() -> FlatDisc,
+    found: Deepest,
+    (most, margin): (f64, f64),
+) -> Option<Place> {
+    let Deepest { place, is_beside, apart } = found;
     let is_within = place.depth >= solid.radius - most && (!is_beside || place.depth >= -margin);
-    (is_within && (apart <= most || solid.reaches(disc, most).is_some())).then_some(place)
+    (is_within && (apart <= most || solid.reaches(&disc(), most).is_some())).then_some(place)
 }
 
 /// The place of a shape at a disc at the border of a sheet: along the way between the nearest points of core
@@ -99,24 +113,25 @@ fn at_border(solid: &Solid<'_>, disc: &FlatDisc, out: Vector, most: f64) -> Opti
 
 /// The deepest place of a shape over a disc, which the shape need not touch. `None` if no part of the shape
 /// is over the disc.
-fn deepest(solid: &Solid<'_>, disc: &FlatDisc, normal: Vector) -> Option<Over> {
-    if solid.is_segment() {
-        let deepest = solid.deepest_over(disc, &normal)?;
-        let (depth, Deepest { height, beside, on_disc }) = (deepest.depth(solid.radius), deepest);
-        let apart = (height * height + beside * beside).sqrt();
-        return Some(Over { place: Place { point: on_disc, normal, depth }, is_beside: beside > 0.0, apart });
-    }
-    if solid.is_box() && solid.radius == 0.0 {
-        let lowest = solid.lowest_over(disc, &normal)?;
-        let height = normal.dot(&(lowest - disc.centre));
-        let point = lowest - normal * height;
-        let place = Place { point, normal, depth: -height };
-        return Some(Over { place, is_beside: false, apart: solid.distance(&point) });
+fn deepest(solid: &Solid<'_>, disc: &FlatDisc, normal: Vector) -> Option<Deepest> {
+    if let Some(over) = over_discs(solid, &Discs::of(disc, &normal)) {
+        let Over { on_disc, depth, is_beside, apart, .. } = over;
+        let place = Place { point: on_disc.into(), normal, depth };
+        return Some(Deepest { place, is_beside, apart }).filter(|_| over.is_over);
     }
     let Lowest { height, on_disc, is_beside, other } = solid.lowest_place(disc, &normal)?;
     let place = Place { point: on_disc, normal, depth: -height };
     // The part of the shape over the disc is convex, so it has a place at each height between two others.
-    Some(Over { place, is_beside, apart: solid.radius - other })
+    Some(Deepest { place, is_beside, apart: solid.radius - other })
+}
+
+/// The deepest places of a shape over discs. `None` if there is no closed form for the shape.
+#[inline(always)]
+pub(crate) fn over_discs<L: Lane>(solid: &Solid<'_>, discs: &Discs<L>) -> Option<Over<L>> {
+    if solid.is_segment() {
+        return Some(Capsule::of(solid).over(discs));
+    }
+    (solid.is_box() && solid.radius == 0.0).then(|| SharpBox::of(solid).over(discs))
 }
 
 /// The place of a shape that is only beside the disc of point `i`, within its thickness: no part of the
@@ -260,9 +275,12 @@ mod tests {
             let solid = Solid::new(&Shape::Capsule { ends, radius }, &Pose::IDENTITY).unwrap();
             let most = radius + margin.max(0.05 * disc.radius);
             let gap = solid.gap(&disc, f64::INFINITY);
-            let Some(deepest) = solid.deepest_over(&disc, &normal) else { continue };
-            let depth = (radius * radius - deepest.beside * deepest.beside).sqrt() - deepest.height;
-            if (gap.distance - most).abs() < 1e-9 || (deepest.beside > 0.0 && depth < -margin) {
+            let deepest = Capsule::of(&solid).over(&Discs::of(&disc, &normal));
+            let depth = deepest.depth;
+            if !deepest.is_over
+                || (gap.distance - most).abs() < 1e-9
+                || (deepest.is_beside && depth < -margin)
+            {
                 continue;
             }
             let found = over_disc(&solid, &disc, normal, (most, margin));

@@ -10,7 +10,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::Solid;
-use crate::solid::deepest::Deepest;
+use crate::solid::deepest::Capsule;
+use crate::solid::discs::Discs;
 
 type Vector = Vector3<f64>;
 
@@ -79,8 +80,12 @@ impl Solid<'_> {
             return None;
         }
         let axis = self.axes[1];
-        let found = Deepest::of_capsule((self.centre, axis * self.half.y), radius, (disc, out))?;
-        let (on_disc, height) = (found.on_disc, -found.depth(radius));
+        let edge = (axis * self.half.y).into();
+        let found = Capsule { centre: self.centre.into(), edge, radius }.over(&Discs::of(disc, out));
+        if !found.is_over {
+            return None;
+        }
+        let (on_disc, height) = (Vector::from(found.on_disc), -found.depth);
         let lowest = on_disc + out * height - self.centre;
         let is_between = axis.dot(&lowest).abs() <= self.half.y * (1.0 + 1e-12);
         is_between.then_some(Lowest { height, on_disc, is_beside: false, other: height })

@@ -1,6 +1,6 @@
-//! The number type of the closed forms: one double, or eight in SIMD lanes.
+//! Doubles for code that runs on one number or on eight at once.
 
-use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f64x8, mask64x8, u64x8};
@@ -9,7 +9,7 @@ use fearless_simd::{f64x8, mask64x8, u64x8};
 ///
 /// Every operation is one that IEEE 754 rounds exactly, so results do not depend on the instruction
 /// set. [`Lane::select`] replaces branches on values.
-pub(crate) trait Lane:
+pub trait Lane:
     Copy
     + Add<Output = Self>
     + Add<f64, Output = Self>
@@ -21,25 +21,41 @@ pub(crate) trait Lane:
     + Neg<Output = Self>
 {
     /// One boolean for each lane.
-    type Mask: Copy + BitAnd<Output = Self::Mask>;
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
 
     /// Returns `x` in every lane.
+    #[must_use]
     fn splat(self, x: f64) -> Self;
+    /// Returns the square root; NaN of a negative number.
+    #[must_use]
     fn sqrt(self) -> Self;
+    /// Returns the magnitude.
+    #[must_use]
     fn abs(self) -> Self;
+    /// Returns `true` where the number is less than the other one, and `false` if either is NaN.
     fn is_less(self, other: Self) -> Self::Mask;
+    /// Returns `true` where the number is at most the other one, and `false` if either is NaN.
+    fn is_at_most(self, other: Self) -> Self::Mask;
     /// Returns the greater number; unspecified if either is NaN.
+    #[must_use]
     fn greater(self, other: Self) -> Self;
     /// Clamps to `least..=greatest`; NaN stays NaN.
+    #[must_use]
     fn within(self, least: f64, greatest: f64) -> Self;
     /// Returns `a` where the mask is true, else `b`.
+    #[must_use]
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Returns `true` if the mask is true in any lane.
+    fn any(mask: Self::Mask) -> bool;
     /// Returns 2⁻ᵉ and 2ᵉ with 2ᵉ ≤ x < 2ᵉ⁺¹, for a normal positive x below 2¹⁰²³.
+    #[must_use]
     fn powers_of_two(self) -> (Self, Self);
 
     // The methods below use loops, because closures passed to the standard library are not compiled
     // for the caller's instruction set.
 
+    /// Returns all of `a` where the mask is true, else all of `b`.
+    #[must_use]
     #[inline(always)]
     fn select_all<const N: usize>(mask: Self::Mask, a: [Self; N], b: [Self; N]) -> [Self; N] {
         let mut selected = b;
@@ -49,6 +65,8 @@ pub(crate) trait Lane:
         selected
     }
 
+    /// Returns all of `a` times this number.
+    #[must_use]
     #[inline(always)]
     fn scale_all<const N: usize>(self, mut a: [Self; N]) -> [Self; N] {
         for x in &mut a {
@@ -56,6 +74,38 @@ pub(crate) trait Lane:
         }
         a
     }
+
+    /// Returns `a` in every lane.
+    #[must_use]
+    #[inline(always)]
+    fn splat_all<const N: usize>(self, a: [f64; N]) -> [Self; N] {
+        let mut all = [self; N];
+        for i in 0..N {
+            all[i] = self.splat(a[i]);
+        }
+        all
+    }
+}
+
+/// a · b, summed in the order of the coordinates.
+#[inline(always)]
+#[must_use]
+pub fn dot<L: Lane>(a: [L; 3], b: [L; 3]) -> L {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// a + b.
+#[inline(always)]
+#[must_use]
+pub fn sum<L: Lane>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// a − b.
+#[inline(always)]
+#[must_use]
+pub fn difference<L: Lane>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// The exponent bits of a double, and the sum of the exponent bits of 2⁻ᵉ and 2ᵉ.
@@ -86,6 +136,11 @@ impl Lane for f64 {
     }
 
     #[inline(always)]
+    fn is_at_most(self, other: Self) -> bool {
+        self <= other
+    }
+
+    #[inline(always)]
     fn greater(self, other: Self) -> Self {
         if self > other { self } else { other }
     }
@@ -99,6 +154,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn select(mask: bool, a: Self, b: Self) -> Self {
         if mask { a } else { b }
+    }
+
+    #[inline(always)]
+    fn any(mask: bool) -> bool {
+        mask
     }
 
     #[inline(always)]
@@ -132,6 +192,11 @@ impl<S: Simd> Lane for f64x8<S> {
     }
 
     #[inline(always)]
+    fn is_at_most(self, other: Self) -> mask64x8<S> {
+        self.simd_le(other)
+    }
+
+    #[inline(always)]
     fn greater(self, other: Self) -> Self {
         self.max(other)
     }
@@ -145,6 +210,11 @@ impl<S: Simd> Lane for f64x8<S> {
     #[inline(always)]
     fn select(mask: mask64x8<S>, a: Self, b: Self) -> Self {
         mask.select(a, b)
+    }
+
+    #[inline(always)]
+    fn any(mask: mask64x8<S>) -> bool {
+        mask.any_true()
     }
 
     #[inline(always)]
