@@ -54,13 +54,11 @@ pub(crate) struct Candidates {
     ends: SheetEnds,
 }
 
-/// A contact, where it is in the stored frame, and the index and the local radius of its point.
+/// A place, and the index of its point.
 #[derive(Debug, Clone, Copy)]
 struct Met {
-    contact: ShapeContact,
-    at: Vector,
+    place: Place,
     i: usize,
-    band: f64,
     /// `true` if the shape moves out past the end of the sheet.
     is_past_end: bool,
 }
@@ -78,7 +76,8 @@ struct Selection<'s, 'a> {
     order: &'s mut BinaryHeap<(u64, Candidate)>,
     /// The number of candidates that have been tried by the same rank.
     tries: u32,
-    taken: [Option<Met>; MOST],
+    /// The numbers of the places that are contacts.
+    taken: [usize; MOST],
     count: usize,
 }
 
@@ -108,7 +107,7 @@ pub(crate) fn contacts(
             let _whole = near.search(level, elements.margin, search);
         }
         for &(i, place) in ends.settle(elements, solid, level, (found, scratch)) {
-            places.push(Met { is_past_end: true, ..Met::new(elements, i, &place) });
+            places.push(Met { place, i, is_past_end: true });
         }
         let mut selection = Selection {
             elements,
@@ -119,13 +118,13 @@ pub(crate) fn contacts(
             chosen,
             order,
             tries: 0,
-            taken: [None; MOST],
+            taken: [0; MOST],
             count: 0,
         };
         selection.run(hint.as_deref());
-        for (n, met) in selection.taken.iter().flatten().enumerate() {
-            (points[n], bands[n], at_ends[n]) = (met.i, met.band, met.is_past_end);
-            out.push(met.contact);
+        for (n, met) in selection.taken().enumerate() {
+            (points[n], bands[n], at_ends[n]) = (met.i, elements.band(met.i), met.is_past_end);
+            out.push(met.contact(elements));
         }
         if elements.detail == Detail::Witness && elements.placed.verifies() {
             for (n, (contact, i)) in out.iter_mut().zip(points).enumerate() {
@@ -160,7 +159,7 @@ impl Selection<'_, '_> {
         };
         match deepest {
             // A shape that touches has a contact.
-            None => self.taken[0] = self.beside(),
+            None => self.take_beside(),
             Some(number) => {
                 self.take(number);
                 self.continue_all(hint);
@@ -169,14 +168,22 @@ impl Selection<'_, '_> {
         }
     }
 
-    /// The deepest contact of a shape that is only beside discs: no candidate has a place.
-    fn beside(&self) -> Option<Met> {
+    /// Takes the deepest contact of a shape that is only beside discs: no candidate has a place.
+    fn take_beside(&mut self) {
         let places = self.found.missed().filter_map(|it| {
             let i = self.found.point(it);
             let place = place_beside(self.elements, self.solid, i, self.found.sign(it))?;
-            Some(Met::new(self.elements, i, &place))
+            Some(Met { place, i, is_past_end: false })
         });
-        places.max_by(Met::deeper)
+        if let Some(deepest) = places.max_by(Met::deeper) {
+            self.places.push(deepest);
+            self.take(self.places.len() - 1);
+        }
+    }
+
+    /// The contacts so far.
+    fn taken(&self) -> impl Iterator<Item = &Met> {
+        self.taken[..self.count].iter().map(|&number| &self.places[number])
     }
 
     /// Returns the number of the place of a candidate.
@@ -217,7 +224,7 @@ impl Selection<'_, '_> {
             return None;
         };
         let number = self.places.len();
-        self.places.push(Met::new(self.elements, self.found.point(candidate), &place));
+        self.places.push(Met { place, i: self.found.point(candidate), is_past_end: false });
         self.found.set_place(candidate, number);
         Some(number)
     }
@@ -228,16 +235,16 @@ impl Selection<'_, '_> {
         let mut best: Option<usize> = None;
         self.tries = 0;
         while let Some(candidate) = self.next(is_front) {
-            if let Some(Met { contact, band, .. }) = best.map(|best| &self.places[best]) {
-                let scale = self.elements.scale();
-                if (contact.depth + LEVEL * band) / scale >= self.found.most(candidate) {
+            if let Some(Met { place, i, .. }) = best.map(|best| &self.places[best]) {
+                let local = f64::from(self.elements.arrays.radii[*i]);
+                if place.depth + LEVEL * local >= self.found.most(candidate) {
                     break;
                 }
                 let i = self.found.point(candidate);
                 let is_settled = self.found.is_settled(candidate);
                 let most = most_depth(self.elements, self.solid, i, self.found.sign(candidate));
                 // It is not deeper than what is found later, either.
-                if !is_settled && contact.depth / scale >= most {
+                if !is_settled && place.depth >= most {
                     self.found.set_most(candidate, most);
                     continue;
                 }
@@ -279,8 +286,9 @@ impl Selection<'_, '_> {
     /// Takes the place of a candidate that continues a contact of the last frame: of the same point or,
     /// without that, near the contact.
     fn continue_from(&mut self, (known, point): (&ShapeContact, usize)) {
-        let taken = || self.taken.iter().flatten();
-        if self.count == MOST || taken().any(|own| ShapeHint::continues(known, &own.contact, own.band)) {
+        let continues =
+            |own: &Met| ShapeHint::continues(known, &own.contact(self.elements), self.elements.band(own.i));
+        if self.count == MOST || self.taken().any(continues) {
             return;
         }
         let at = self.elements.placed.stored_to_world().apply_inverse(known.point);
@@ -298,7 +306,7 @@ impl Selection<'_, '_> {
                 return;
             }
             if let Some(own) = self.place(candidate)
-                && ShapeHint::continues(known, &self.places[own].contact, band)
+                && ShapeHint::continues(known, &self.places[own].contact(self.elements), band)
                 && self.is_free(own)
             {
                 self.take(own);
@@ -314,8 +322,8 @@ impl Selection<'_, '_> {
         while self.count < MOST {
             let (wanted, before) = (MOST - self.count + 1, self.count);
             let mut contacts = [[0.0; 3]; MOST];
-            for (at, met) in contacts.iter_mut().zip(self.taken.iter().flatten()) {
-                *at = single(&met.at);
+            for (at, met) in contacts.iter_mut().zip(self.taken()) {
+                *at = single(&met.place.point);
             }
             self.chosen.clear();
             self.found.choose(self.level, &contacts[..before], (wanted, &mut *self.chosen));
@@ -325,7 +333,7 @@ impl Selection<'_, '_> {
                     && self.count < MOST
                     && self.is_free(own)
                 {
-                    self.taken[self.count] = Some(self.places[own]);
+                    self.taken[self.count] = own;
                     self.count += 1;
                 }
             }
@@ -338,34 +346,35 @@ impl Selection<'_, '_> {
 
     /// Returns `true` if a place is apart from all contacts.
     fn is_free(&self, own: usize) -> bool {
-        let Met { at, i, .. } = self.places[own];
+        let Met { place, i, .. } = self.places[own];
         let least = f64::from(SPREAD * self.elements.arrays.radii[i]);
-        self.taken.iter().flatten().all(|other| (other.at - at).norm_squared() >= least * least)
+        self.taken().all(|other| (other.place.point - place.point).norm_squared() >= least * least)
     }
 
     /// Adds a place to the contacts.
     fn take(&mut self, own: usize) {
         let met = self.places[own];
-        self.taken[self.count] = Some(met);
+        self.taken[self.count] = own;
         self.count += 1;
-        self.found.separate(self.level, single(&met.at), met.i);
+        self.found.separate(self.level, single(&met.place.point), met.i);
     }
 }
 
 impl Met {
-    fn new(elements: &Elements<'_>, i: usize, place: &Place) -> Self {
-        let contact = ShapeContact {
-            point: elements.in_world(&place.point),
-            normal: elements.turned(&place.normal),
-            depth: place.depth * elements.scale(),
-            id: u64::from(elements.placed.scan().id(i).0),
-        };
-        Self { contact, at: place.point, i, band: elements.band(i), is_past_end: false }
+    /// The contact in the world.
+    fn contact(&self, elements: &Elements<'_>) -> ShapeContact {
+        let Place { point, normal, depth } = &self.place;
+        ShapeContact {
+            point: elements.in_world(point),
+            normal: elements.turned(normal),
+            depth: depth * elements.scale(),
+            id: u64::from(elements.placed.scan().id(self.i).0),
+        }
     }
 
     /// Compares the depths; of equal ones the first point is deeper.
     fn deeper(&self, other: &Self) -> Ordering {
-        self.contact.depth.total_cmp(&other.contact.depth).then(other.i.cmp(&self.i))
+        self.place.depth.total_cmp(&other.place.depth).then(other.i.cmp(&self.i))
     }
 }
 
@@ -394,7 +403,7 @@ mod tests {
             let (sign, is_behind) =
                 if elements.is_disc(i) { sides.of(&disc, elements.band(i)) } else { (1.0, false) };
             if let Some(place) = place_at(elements, solid, i, sign) {
-                all[usize::from(is_behind)].push(Met::new(elements, i, &place));
+                all[usize::from(is_behind)].push(Met { place, i, is_past_end: false });
             }
         }
         all
@@ -468,14 +477,17 @@ mod tests {
                 continue;
             }
             let deepest = near.iter().max_by(|a, b| a.deeper(b)).unwrap();
-            let band = all.iter().find(|met| met.contact.id == out[0].id).map_or(0.0, |met| met.band);
-            let least = deepest.contact.depth - LEVEL * band;
+            let band = all
+                .iter()
+                .find(|met| met.contact(&elements).id == out[0].id)
+                .map_or(0.0, |met| elements.band(met.i));
+            let least = deepest.contact(&elements).depth - LEVEL * band;
             assert!(out[0].depth >= least, "{name}, round {round}: {:?}, deepest {deepest:?}", out[0]);
-            let ids: Vec<u64> = all.iter().map(|met| met.contact.id).collect();
+            let ids: Vec<u64> = all.iter().map(|met| met.contact(&elements).id).collect();
             let own = |contact: &ShapeContact| {
                 let n = ids.iter().position(|&id| id == contact.id);
                 let n = n.unwrap_or_else(|| panic!("{name}, round {round}: {contact:?} is no place"));
-                assert_eq!(all[n].contact, *contact, "{name}, round {round}");
+                assert_eq!(all[n].contact(&elements), *contact, "{name}, round {round}");
                 all[n]
             };
             let taken: Vec<Met> = out.iter().map(own).collect();
@@ -505,10 +517,11 @@ mod tests {
         fn next(&self, taken: &[Met]) -> Option<Met> {
             let apart = |met: &Met| {
                 let centre = self.elements.position(met.i);
-                let away = |x: Vector| taken.iter().map(|it| (x - it.at).norm()).fold(f64::MAX, f64::min);
+                let away =
+                    |x: Vector| taken.iter().map(|it| (x - it.place.point).norm()).fold(f64::MAX, f64::min);
                 let of_centres = taken.iter().map(|it| (centre - self.elements.position(it.i)).norm());
                 let least = f64::from(SPREAD * self.elements.arrays.radii[met.i]) * (1.0 + 1e-4);
-                let away = [away(met.at), away(centre), of_centres.fold(f64::MAX, f64::min)];
+                let away = [away(met.place.point), away(centre), of_centres.fold(f64::MAX, f64::min)];
                 (away.into_iter().fold(f64::MAX, f64::min) > least).then_some((away[1], *met))
             };
             self.near.iter().filter_map(apart).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, met)| met)
@@ -526,7 +539,9 @@ mod tests {
 
         /// The greatest distance of a place from the nearest contact.
         fn gap(&self, taken: &[Met]) -> f64 {
-            let away = |met: &Met| taken.iter().map(|it| (met.at - it.at).norm()).fold(f64::MAX, f64::min);
+            let away = |met: &Met| {
+                taken.iter().map(|it| (met.place.point - it.place.point).norm()).fold(f64::MAX, f64::min)
+            };
             self.near.iter().map(away).fold(0.0, f64::max)
         }
     }
