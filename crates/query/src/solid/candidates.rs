@@ -22,7 +22,7 @@ pub(crate) struct CandidateBlock {
     pub(crate) most: [f32; WIDTH],
     /// The squared distances from the nearest contact that was selected, or candidate that was chosen.
     pub(crate) away_sq: [f32; WIDTH],
-    /// A candidate gives another contact from this squared distance on.
+    /// A candidate gives another contact beyond this squared distance.
     pub(crate) apart_sq: [f32; WIDTH],
     /// The numbers of the places that are known.
     places: [u32; WIDTH],
@@ -74,7 +74,11 @@ pub(crate) struct Candidate(u32);
 
 /// Blocks of candidates; reusable memory.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct CandidateBlocks(Vec<CandidateBlock>);
+pub(crate) struct CandidateBlocks {
+    blocks: Vec<CandidateBlock>,
+    /// The numbers of the blocks, in the order of their points.
+    order: Vec<u32>,
+}
 
 impl CandidateBlock {
     /// Candidates from the point `first` on. `measured` are their centres, the bounds of their depths and
@@ -115,22 +119,30 @@ impl CandidateBlock {
     #[inline(always)]
     fn apart<S: Simd>(&self, simd: S) -> u32 {
         let away_sq = f32x16::load_array_ref(simd, &self.away_sq);
-        let is_apart: mask32x16<S> = away_sq.simd_ge(f32x16::load_array_ref(simd, &self.apart_sq));
+        let is_apart: mask32x16<S> = away_sq.simd_gt(f32x16::load_array_ref(simd, &self.apart_sq));
         bits(is_apart)
     }
 }
 
 impl CandidateBlocks {
     pub(crate) fn clear(&mut self) {
-        self.0.clear();
+        self.blocks.clear();
+        self.order.clear();
     }
 
     pub(crate) fn push(&mut self, block: CandidateBlock) {
-        self.0.push(block);
+        self.blocks.push(block);
+    }
+
+    /// Orders the blocks, once all are added.
+    pub(crate) fn arrange(&mut self) {
+        let Self { blocks, order } = self;
+        order.extend(0..id32(blocks.len()));
+        order.sort_unstable_by_key(|&number| blocks[number as usize].first);
     }
 
     fn at(&self, Candidate(n): Candidate) -> (&CandidateBlock, usize) {
-        (&self.0[n as usize / WIDTH], n as usize % WIDTH)
+        (&self.blocks[n as usize / WIDTH], n as usize % WIDTH)
     }
 
     /// The index of the point of a candidate.
@@ -155,12 +167,12 @@ impl CandidateBlocks {
     pub(crate) fn set_most(&mut self, Candidate(n): Candidate, most: f64) {
         #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
         let most = (most as f32).next_up();
-        self.0[n as usize / WIDTH].most[n as usize % WIDTH] = most;
+        self.blocks[n as usize / WIDTH].most[n as usize % WIDTH] = most;
     }
 
     /// The number of the candidate's place, if that is known. The depth no longer ranks it then.
     pub(crate) fn place(&mut self, Candidate(n): Candidate) -> Option<usize> {
-        let (block, lane) = (&mut self.0[n as usize / WIDTH], n as usize % WIDTH);
+        let (block, lane) = (&mut self.blocks[n as usize / WIDTH], n as usize % WIDTH);
         block.placed |= block.settled & 1 << lane;
         (block.placed >> lane & 1 == 1).then(|| block.places[lane] as usize)
     }
@@ -169,7 +181,7 @@ impl CandidateBlocks {
     /// shape is beside. Its depth ranks it.
     pub(crate) fn settle(&mut self, candidate: Candidate, number: usize, depth: f64) {
         let Candidate(n) = candidate;
-        let (block, lane) = (&mut self.0[n as usize / WIDTH], n as usize % WIDTH);
+        let (block, lane) = (&mut self.blocks[n as usize / WIDTH], n as usize % WIDTH);
         block.settled |= 1 << lane;
         block.places[lane] = id32(number);
         block.lanes |= 1 << lane;
@@ -185,7 +197,7 @@ impl CandidateBlocks {
     }
 
     pub(crate) fn set_place(&mut self, Candidate(n): Candidate, number: usize) {
-        let (block, lane) = (&mut self.0[n as usize / WIDTH], n as usize % WIDTH);
+        let (block, lane) = (&mut self.blocks[n as usize / WIDTH], n as usize % WIDTH);
         block.placed |= 1 << lane;
         block.places[lane] = id32(number);
     }
@@ -194,15 +206,15 @@ impl CandidateBlocks {
     pub(crate) fn miss(&mut self, candidate: Candidate) {
         self.remove(candidate);
         let Candidate(n) = candidate;
-        self.0[n as usize / WIDTH].missed |= 1 << (n as usize % WIDTH);
+        self.blocks[n as usize / WIDTH].missed |= 1 << (n as usize % WIDTH);
     }
 
     pub(crate) fn remove(&mut self, Candidate(n): Candidate) {
-        self.0[n as usize / WIDTH].lanes &= !(1 << (n as usize % WIDTH));
+        self.blocks[n as usize / WIDTH].lanes &= !(1 << (n as usize % WIDTH));
     }
 
     pub(crate) fn remove_behind(&mut self) {
-        for block in &mut self.0 {
+        for block in &mut self.blocks {
             block.lanes &= !block.behind;
         }
     }
@@ -225,7 +237,7 @@ impl CandidateBlocks {
     }
 
     fn lanes(&self, of: impl Fn(&CandidateBlock) -> u32) -> impl Iterator<Item = Candidate> {
-        let all = self.0.iter().enumerate();
+        let all = self.blocks.iter().enumerate();
         all.flat_map(move |(n, block)| Bits(of(block)).map(move |lane| Candidate(id32(n * WIDTH + lane))))
     }
 
@@ -240,12 +252,13 @@ impl CandidateBlocks {
 
     #[inline(always)]
     fn first_by<S: Simd>(&self, simd: S, is_front: bool) -> Option<Candidate> {
-        let mut furthest = Greatest::none(simd);
-        for (number, block) in (0..).zip(&self.0) {
+        let mut deepest = Greatest::none(simd);
+        for &number in &self.order {
+            let block = &self.blocks[number as usize];
             let most = f32x16::load_array_ref(simd, &block.most);
-            furthest.offer(simd, among(simd, most, block.by_depth(is_front)), (number, block.first));
+            deepest.offer(simd, among(simd, most, block.by_depth(is_front)), number);
         }
-        furthest.candidate()
+        deepest.candidate(&self.blocks)
     }
 
     /// Measures the distances from a contact of the point `own`, which is no longer a candidate. Those that
@@ -260,7 +273,7 @@ impl CandidateBlocks {
 
     #[inline(always)]
     fn separate_by<S: Simd>(&mut self, simd: S, at: [f32; 3], own: u32) {
-        for block in &mut self.0 {
+        for block in &mut self.blocks {
             let away_sq = squared(seen_from(simd, &block.centres, at));
             let away_sq = away_sq.min(f32x16::load_array_ref(simd, &block.away_sq));
             block.away_sq = away_sq.to_array();
@@ -290,25 +303,28 @@ impl CandidateBlocks {
         contacts: &[[f32; 3]],
         (wanted, chosen): (usize, &mut Vec<Candidate>),
     ) {
+        let none = f32x16::splat(simd, f32::NEG_INFINITY);
         let mut last = None;
         for _ in 0..wanted {
             let mut furthest = Greatest::none(simd);
-            for (number, block) in (0..).zip(&mut self.0) {
-                let mut away_sq = f32x16::load_array_ref(simd, &block.away_sq);
-                if last.is_none() {
-                    away_sq = f32x16::splat(simd, f32::INFINITY);
+            for &number in &self.order {
+                let block = &mut self.blocks[number as usize];
+                let away_sq = if let Some(at) = last {
+                    let away_sq = squared(seen_from(simd, &block.centres, at));
+                    away_sq.min(f32x16::load_array_ref(simd, &block.away_sq))
+                } else {
+                    let mut away_sq = f32x16::splat(simd, f32::INFINITY);
                     for &at in contacts {
                         away_sq = away_sq.min(squared(seen_from(simd, &block.centres, at)));
                     }
-                }
-                if let Some(at) = last {
-                    away_sq = away_sq.min(squared(seen_from(simd, &block.centres, at)));
-                }
+                    among(simd, away_sq, block.lanes)
+                };
                 block.away_sq = away_sq.to_array();
-                let apart = block.lanes & block.apart(simd);
-                furthest.offer(simd, among(simd, away_sq, apart), (number, block.first));
+                let is_apart: mask32x16<S> = away_sq.simd_gt(f32x16::load_array_ref(simd, &block.apart_sq));
+                furthest.offer(simd, is_apart.select(away_sq, none), number);
             }
-            let Some(first) = furthest.candidate() else { return };
+            let Some(first) = furthest.candidate(&self.blocks) else { return };
+            // No longer apart from a contact, so not chosen again.
             self.remove(first);
             last = Some(self.centre(first));
             chosen.push(first);
@@ -339,7 +355,7 @@ impl CandidateBlocks {
 
     /// Leaves a point out of [`Self::first_border`].
     pub(crate) fn look_at(&mut self, Candidate(n): Candidate) {
-        self.0[n as usize / WIDTH].borders &= !(1 << (n as usize % WIDTH));
+        self.blocks[n as usize / WIDTH].borders &= !(1 << (n as usize % WIDTH));
     }
 
     /// Marks the points near a plane. Returns the greatest bound of their depths, and the least square of
@@ -355,7 +371,7 @@ impl CandidateBlocks {
     fn mark_slab_by<S: Simd>(&mut self, simd: S, slab: &Slab) -> [f32; 2] {
         let none = f32x16::splat(simd, f32::NEG_INFINITY);
         let (mut most, mut nearness) = (none, none);
-        for block in &mut self.0 {
+        for block in &mut self.blocks {
             let height = along(seen_from(simd, &block.centres, slab.at), slab.normal);
             let is_level: mask32x16<S> = height.abs().simd_le(slab.within);
             block.slab = bits(is_level) & (block.lanes | block.missed);
@@ -384,7 +400,7 @@ impl CandidateBlocks {
     #[inline(always)]
     fn nearest_by<S: Simd>(&self, simd: S, at: [f32; 3], except: &[u32]) -> Option<(f32, Candidate)> {
         let (mut best, mut nearest) = ((f32::INFINITY, u32::MAX), None);
-        for (n, block) in self.0.iter().enumerate() {
+        for (n, block) in self.blocks.iter().enumerate() {
             let excepted = |&i: &u32| 1_u32.checked_shl(i.wrapping_sub(block.first)).unwrap_or(0);
             let lanes =
                 block.lanes & block.apart(simd) & !except.iter().map(excepted).fold(0, |all, own| all | own);
@@ -406,52 +422,44 @@ impl CandidateBlocks {
             let lane = i.wrapping_sub(block.first as usize);
             (lane < WIDTH && block.lanes >> lane & 1 == 1).then_some(lane)
         };
-        let found = self.0.iter().enumerate().find_map(|(n, block)| Some((n, holds(block)?)));
+        let found = self.blocks.iter().enumerate().find_map(|(n, block)| Some((n, holds(block)?)));
         found.map(|(n, lane)| Candidate(id32(n * WIDTH + lane)))
     }
 }
 
-/// The greatest number of each lane, its block, and the first point of that.
+/// The greatest number of each lane, and its block.
 struct Greatest<S: Simd> {
     numbers: f32x16<S>,
     blocks: u32x16<S>,
-    firsts: u32x16<S>,
 }
 
 impl<S: Simd> Greatest<S> {
     #[inline(always)]
     fn none(simd: S) -> Self {
-        Self {
-            numbers: f32x16::splat(simd, f32::NEG_INFINITY),
-            blocks: u32x16::splat(simd, 0),
-            firsts: u32x16::splat(simd, u32::MAX),
-        }
+        Self { numbers: f32x16::splat(simd, f32::NEG_INFINITY), blocks: u32x16::splat(simd, 0) }
     }
 
-    /// Compares the numbers of a block. Of equal ones that of the first point counts.
+    /// Compares the numbers of a block. Of equal ones those of the first block count.
     #[inline(always)]
-    fn offer(&mut self, simd: S, numbers: f32x16<S>, (block, first): (u32, u32)) {
-        let (block, first) = (u32x16::splat(simd, block), u32x16::splat(simd, first));
-        let (is_greater, is_equal): (mask32x16<S>, mask32x16<S>) =
-            (numbers.simd_gt(self.numbers), numbers.simd_eq(self.numbers));
-        let is_before: mask32x16<S> = first.simd_lt(self.firsts);
-        let is_first = is_greater | (is_equal & is_before);
-        self.numbers = numbers.max(self.numbers);
-        self.blocks = is_first.select(block, self.blocks);
-        self.firsts = is_first.select(first, self.firsts);
+    fn offer(&mut self, simd: S, numbers: f32x16<S>, block: u32) {
+        let is_greater: mask32x16<S> = numbers.simd_gt(self.numbers);
+        self.numbers = is_greater.select(numbers, self.numbers);
+        self.blocks = is_greater.select(u32x16::splat(simd, block), self.blocks);
     }
 
-    /// The candidate with the greatest number. `None` if that is negative infinity.
+    /// The candidate with the greatest number, and of equal ones the first point. `None` if the number is
+    /// negative infinity.
     #[inline(always)]
-    fn candidate(&self) -> Option<Candidate> {
+    fn candidate(&self, blocks: &[CandidateBlock]) -> Option<Candidate> {
         let greatest = self.numbers.reduce_max();
         if greatest == f32::NEG_INFINITY {
             return None;
         }
         let is_greatest: mask32x16<S> = self.numbers.simd_eq(greatest);
-        let (blocks, firsts) = (self.blocks.to_array(), self.firsts.to_array());
-        let lane = Bits(bits(is_greatest)).min_by_key(|&lane| firsts[lane] + id32(lane))?;
-        Some(Candidate(blocks[lane] * id32(WIDTH) + id32(lane)))
+        let numbers = self.blocks.to_array();
+        let first = |&lane: &usize| blocks[numbers[lane] as usize].first + id32(lane);
+        let lane = Bits(bits(is_greatest)).min_by_key(first)?;
+        Some(Candidate(numbers[lane] * id32(WIDTH) + id32(lane)))
     }
 }
 
@@ -504,6 +512,7 @@ mod tests {
                 });
                 found.push(CandidateBlock { away_sq: numbers.map(f32::abs), ..block });
             }
+            found.arrange();
             for is_front in [true, false] {
                 let all = found.lanes(|block| block.by_depth(is_front));
                 let mut expected: Vec<(f32, usize)> = all
@@ -563,13 +572,14 @@ mod tests {
                 }));
             }
             all.sort_by_key(|&(i, _)| i);
+            found.arrange();
             let (mut taken, mut expected) = (contacts.to_vec(), Vec::new());
             for _ in 0..9 {
                 let mut best: Option<(f32, usize, [f32; 3])> = None;
                 for &(i, place) in &all {
                     let apart = |at: &[f32; 3]| (0..3).map(|k| (place[k] - at[k]).powi(2)).sum::<f32>();
                     let away = taken.iter().map(apart).fold(f32::INFINITY, f32::min);
-                    if away >= 4.0 && best.is_none_or(|best| away > best.0) && !expected.contains(&i) {
+                    if away > 4.0 && best.is_none_or(|best| away > best.0) && !expected.contains(&i) {
                         best = Some((away, i, place));
                     }
                 }

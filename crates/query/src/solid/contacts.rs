@@ -105,6 +105,7 @@ pub(crate) fn contacts(
             let search = &mut Gather { near, sides: &sides, found: &mut *found };
             // The search never ends early.
             let _whole = near.search(level, elements.margin, search);
+            found.arrange();
         }
         for &(i, place) in ends.settle(elements, solid, level, (found, scratch)) {
             places.push(Met { place, i, is_past_end: true });

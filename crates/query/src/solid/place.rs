@@ -114,10 +114,10 @@ fn at_border(solid: &Solid<'_>, disc: &FlatDisc, out: Vector, most: f64) -> Opti
 /// The deepest place of a shape over a disc, which the shape need not touch. `None` if no part of the shape
 /// is over the disc.
 fn deepest(solid: &Solid<'_>, disc: &FlatDisc, normal: Vector) -> Option<Deepest> {
-    if let Some(over) = over_discs(solid, &Discs::of(disc, &normal)) {
-        let Over { on_disc, depth, is_beside, apart, .. } = over;
+    if is_closed(solid) {
+        let Over { is_over, on_disc, depth, is_beside, apart } = over_discs(solid, &Discs::of(disc, &normal));
         let place = Place { point: on_disc.into(), normal, depth };
-        return Some(Deepest { place, is_beside, apart }).filter(|_| over.is_over);
+        return is_over.then_some(Deepest { place, is_beside, apart });
     }
     let Lowest { height, on_disc, is_beside, other } = solid.lowest_place(disc, &normal)?;
     let place = Place { point: on_disc, normal, depth: -height };
@@ -125,13 +125,15 @@ fn deepest(solid: &Solid<'_>, disc: &FlatDisc, normal: Vector) -> Option<Deepest
     Some(Deepest { place, is_beside, apart: solid.radius - other })
 }
 
-/// The deepest places of a shape over discs. `None` if there is no closed form for the shape.
+/// Returns `true` if there is a closed form for the deepest places of a shape over discs.
+pub(crate) fn is_closed(solid: &Solid<'_>) -> bool {
+    solid.is_segment() || (solid.is_box() && solid.radius == 0.0)
+}
+
+/// The deepest places over discs of a shape for which there is a closed form.
 #[inline(always)]
-pub(crate) fn over_discs<L: Lane>(solid: &Solid<'_>, discs: &Discs<L>) -> Option<Over<L>> {
-    if solid.is_segment() {
-        return Some(Capsule::of(solid).over(discs));
-    }
-    (solid.is_box() && solid.radius == 0.0).then(|| SharpBox::of(solid).over(discs))
+pub(crate) fn over_discs<L: Lane>(solid: &Solid<'_>, discs: &Discs<L>) -> Over<L> {
+    if solid.is_segment() { Capsule::of(solid).over(discs) } else { SharpBox::of(solid).over(discs) }
 }
 
 /// The place of a shape that is only beside the disc of point `i`, within its thickness: no part of the

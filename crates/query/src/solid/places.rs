@@ -10,7 +10,7 @@ use crate::leaf::disc_triangle::FlatDisc;
 use crate::solid::core::Solid;
 use crate::solid::discs::{Discs, Over};
 use crate::solid::elements::Elements;
-use crate::solid::place::{Deepest, Place, over_discs, place_at, within};
+use crate::solid::place::{Deepest, Place, is_closed, over_discs, place_at, within};
 
 /// The number of places that are computed at once.
 pub(crate) const LANES: usize = 8;
@@ -55,14 +55,15 @@ pub(crate) fn places_at(
     let zeros = [[0.0; LANES]; 3];
     let mut block = DiscBlock { centres: zeros, normals: zeros, radii: [0.0; LANES] };
     let (mut discs, mut first) = (0, None);
-    for (lane, &(i, sign)) in points.iter().enumerate() {
+    let in_lanes = if is_closed(solid) { points } else { &[] };
+    for (lane, &(i, sign)) in in_lanes.iter().enumerate() {
         if elements.is_disc(i) && elements.placed.scan().kind(i) != PointKind::Edge {
             block.put(lane, elements, (i, sign));
             discs |= 1_u32 << lane;
             first.get_or_insert((i, sign));
         }
     }
-    let found = first.filter(|_| discs.count_ones() as usize >= FEWEST).and_then(|disc| {
+    let found = first.filter(|_| discs.count_ones() as usize >= FEWEST).map(|disc| {
         for lane in Bits(!discs & ((1 << LANES) - 1)) {
             block.put(lane, elements, disc);
         }
@@ -89,9 +90,8 @@ impl DiscBlock {
         self.radii[lane] = f64::from(elements.arrays.discs.get(i));
     }
 
-    /// `None` if there is no closed form for the shape.
     #[inline(always)]
-    fn over<S: Simd>(&self, simd: S, solid: &Solid<'_>) -> Option<OverBlock> {
+    fn over<S: Simd>(&self, simd: S, solid: &Solid<'_>) -> OverBlock {
         let load = |row: &[f64; LANES]| f64x8::load_array_ref(simd, row);
         let [x, y, z] = &self.normals;
         let [x, y, z] = [load(x), load(y), load(z)];
@@ -99,18 +99,18 @@ impl DiscBlock {
         let out = [x / length, y / length, z / length];
         let [a, b, c] = &self.centres;
         let discs = Discs { centre: [load(a), load(b), load(c)], out, radius: load(&self.radii) };
-        let Over { is_over, on_disc, depth, is_beside, apart } = over_discs(solid, &discs)?;
+        let Over { is_over, on_disc, depth, is_beside, apart } = over_discs(solid, &discs);
         let [a, b, c] = on_disc;
         let [x, y, z] = out;
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-        Some(OverBlock {
+        OverBlock {
             points: [a.to_array(), b.to_array(), c.to_array()],
             out: [x.to_array(), y.to_array(), z.to_array()],
             depths: depth.to_array(),
             apart: apart.to_array(),
             over: is_over.to_bitmask() as u32,
             beside: is_beside.to_bitmask() as u32,
-        })
+        }
     }
 }
 
