@@ -45,6 +45,11 @@ pub trait Lane:
     /// Returns `a` where the mask is true, else `b`.
     #[must_use]
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Returns a mask that is `false` in every lane.
+    #[inline(always)]
+    fn nowhere(self) -> Self::Mask {
+        self.is_less(self)
+    }
     /// Returns `true` if the mask is true in any lane.
     fn any(mask: Self::Mask) -> bool;
     /// Returns 2⁻ᵉ and 2ᵉ with 2ᵉ ≤ x < 2ᵉ⁺¹, for a normal positive x below 2¹⁰²³.

@@ -117,8 +117,8 @@ impl<'a> Target<'a> {
 
     /// Writes up to eight contacts of a shape with the scan to `out`. Clears `out` first.
     ///
-    /// The first contact is the deepest, up to 0.01 local radii. The others are those of discs and balls that
-    /// are far from it and from each other. If the plan has a margin, a shape that is apart by less than the
+    /// The first contact is the deepest, up to 0.01 local radii. The others are spread out, at least
+    /// half a local radius apart. If the plan has a margin, a shape that is apart by less than the
     /// margin has contacts of negative depth.
     ///
     /// The normal of a disc points outwards if the scan is oriented, otherwise to the side of the

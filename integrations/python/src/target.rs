@@ -217,8 +217,8 @@ impl Target {
     }
 
     /// Return up to eight contacts of a shape, as a structured array of shape (N,). The first is the
-    /// deepest; the others are far from it and from each other. No limit ends the search early; `touch`
-    /// tells the evidence of a contact.
+    /// deepest; the others are spread out, at least half a local radius apart. No limit ends the search
+    /// early; `touch` tells the evidence of a contact.
     ///
     /// Its fields are `point`, `normal` (the direction in which the shape moves out), `depth` (negative
     /// for a gap within the margin) and `id`, which stays the same from frame to frame with a `hint`.

@@ -20,7 +20,8 @@ pub(crate) struct CandidateBlock {
     pub(crate) centres: [[f32; WIDTH]; 3],
     /// Upper bounds on the depths, in the stored frame.
     pub(crate) most: [f32; WIDTH],
-    /// The squared distances from the nearest contact that was selected, or candidate that was chosen.
+    /// The squared distances from the nearest contact, or candidate that was chosen; negative infinity in
+    /// lanes without a candidate.
     pub(crate) away_sq: [f32; WIDTH],
     /// A candidate gives another contact beyond this squared distance.
     pub(crate) apart_sq: [f32; WIDTH],
@@ -81,8 +82,8 @@ pub(crate) struct CandidateBlocks {
 }
 
 impl CandidateBlock {
-    /// Candidates from the point `first` on. `measured` are their centres, the bounds of their depths and
-    /// the distances from which on they give another contact.
+    /// Candidates from the point `first` on, with their centres, the bounds of their depths and the distances
+    /// beyond which they give another contact.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(
         first: usize,
@@ -113,14 +114,6 @@ impl CandidateBlock {
     #[inline(always)]
     fn by_depth(&self, is_front: bool) -> u32 {
         self.lanes & !self.placed & if is_front { !self.behind } else { self.behind }
-    }
-
-    /// The lanes that give another contact, as bits.
-    #[inline(always)]
-    fn apart<S: Simd>(&self, simd: S) -> u32 {
-        let away_sq = f32x16::load_array_ref(simd, &self.away_sq);
-        let is_apart: mask32x16<S> = away_sq.simd_gt(f32x16::load_array_ref(simd, &self.apart_sq));
-        bits(is_apart)
     }
 }
 
@@ -209,7 +202,7 @@ impl CandidateBlocks {
         self.blocks[n as usize / WIDTH].missed |= 1 << (n as usize % WIDTH);
     }
 
-    pub(crate) fn remove(&mut self, Candidate(n): Candidate) {
+    fn remove(&mut self, Candidate(n): Candidate) {
         self.blocks[n as usize / WIDTH].lanes &= !(1 << (n as usize % WIDTH));
     }
 
@@ -241,8 +234,8 @@ impl CandidateBlocks {
         all.flat_map(move |(n, block)| Bits(of(block)).map(move |lane| Candidate(id32(n * WIDTH + lane))))
     }
 
-    /// The candidate with the greatest bound of its depth, among those before or behind the surface whose place
-    /// is not known. O(n), as the next ones.
+    /// The candidate with the greatest bound of its depth, among those before or behind the surface whose
+    /// place is not known. O(n), as the next ones.
     pub(crate) fn first(&self, level: Level, is_front: bool) -> Option<Candidate> {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -261,29 +254,9 @@ impl CandidateBlocks {
         deepest.candidate(&self.blocks)
     }
 
-    /// Measures the distances from a contact of the point `own`, which is no longer a candidate. Those that
-    /// are not apart from it no longer have a rank by distance. O(n).
-    pub(crate) fn separate(&mut self, level: Level, at: [f32; 3], own: usize) {
-        let own = id32(own);
-        dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
-            || self.separate_by(simd, at, own),
-        ));
-    }
-
-    #[inline(always)]
-    fn separate_by<S: Simd>(&mut self, simd: S, at: [f32; 3], own: u32) {
-        for block in &mut self.blocks {
-            let away_sq = squared(seen_from(simd, &block.centres, at));
-            let away_sq = away_sq.min(f32x16::load_array_ref(simd, &block.away_sq));
-            block.away_sq = away_sq.to_array();
-            let is_own = 1_u32.checked_shl(own.wrapping_sub(block.first)).unwrap_or(0);
-            block.lanes &= !is_own;
-        }
-    }
-
-    /// Measures the distances from contacts anew. Adds up to `wanted` candidates to `chosen`, each of which is
-    /// the furthest from the contacts and those before. They no longer are candidates. O(n) each.
+    /// Adds up to `wanted` candidates to `chosen`. Each is the furthest from the contacts and from those
+    /// added before, and apart from all of these. Candidates that are added are no longer candidates. O(n)
+    /// each.
     pub(crate) fn choose(
         &mut self,
         level: Level,
@@ -324,7 +297,7 @@ impl CandidateBlocks {
                 furthest.offer(simd, is_apart.select(away_sq, none), number);
             }
             let Some(first) = furthest.candidate(&self.blocks) else { return };
-            // No longer apart from a contact, so not chosen again.
+            // Its distance is 0 from now on, so it is not chosen again.
             self.remove(first);
             last = Some(self.centre(first));
             chosen.push(first);
@@ -402,8 +375,7 @@ impl CandidateBlocks {
         let (mut best, mut nearest) = ((f32::INFINITY, u32::MAX), None);
         for (n, block) in self.blocks.iter().enumerate() {
             let excepted = |&i: &u32| 1_u32.checked_shl(i.wrapping_sub(block.first)).unwrap_or(0);
-            let lanes =
-                block.lanes & block.apart(simd) & !except.iter().map(excepted).fold(0, |all, own| all | own);
+            let lanes = block.lanes & !except.iter().map(excepted).fold(0, |all, own| all | own);
             let away_sq = squared(seen_from(simd, &block.centres, at));
             let least = -among(simd, -away_sq, lanes).reduce_max();
             let is_least: mask32x16<S> = away_sq.simd_eq(least);
@@ -486,8 +458,8 @@ mod tests {
 
     use super::*;
 
-    /// Candidates come in the order of their numbers, and equal ones in that of their points, whether they
-    /// are looked for one by one or ordered at once, in any order of the blocks.
+    /// Candidates come in the order of the bounds of their depths, and equal ones in that of their points,
+    /// whether they are looked for one by one or ordered at once, in any order of the blocks.
     #[test]
     fn candidates_come_in_one_order() {
         let rng = &mut rng(7359);
@@ -510,7 +482,7 @@ mod tests {
                     let depths = f32x16::load_array(simd, numbers);
                     CandidateBlock::new(first, lanes, [[0.0; WIDTH]; 3], [depths, depths])
                 });
-                found.push(CandidateBlock { away_sq: numbers.map(f32::abs), ..block });
+                found.push(block);
             }
             found.arrange();
             for is_front in [true, false] {

@@ -2,9 +2,9 @@
 //!
 //! Each disc that the shape touches can give one contact, the deepest place of the shape over the disc.
 //! Each ball can give one along the way from its centre. The deepest is selected first, then those that
-//! continue contacts of the last frame, then those whose discs or balls are furthest from each other. A shape
-//! may touch hundreds of discs, so a place is computed only where the selection
-//! depends on it: the bounds of [`gather`](crate::solid::gather) tell where the deepest may be.
+//! continue contacts of the last frame, then those whose discs or balls are furthest from all before. A shape
+//! may touch hundreds of discs, so a place is computed only where the selection depends on it: the bounds of
+//! [`gather`](crate::solid::gather) tell where the deepest may be.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -44,6 +44,9 @@ const TRIES: usize = 3;
 /// Evaluations that move the deepest contact over the surface.
 const SLIDES: u32 = 3;
 
+/// The contacts of the last frame, and those that there is room for, are computed at once.
+const _: () = assert!(MOST <= LANES);
+
 /// Reusable memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Candidates {
@@ -72,9 +75,9 @@ struct Selection<'s, 'a> {
     places: &'s mut Vec<Met>,
     /// Candidates whose places are computed at once.
     chosen: &'s mut Vec<Candidate>,
-    /// The candidates in order, once so many have been tried.
+    /// The candidates by depth, once so many have been tried.
     order: &'s mut BinaryHeap<(u64, Candidate)>,
-    /// The number of candidates that have been tried by the same rank.
+    /// The number of candidates that have been tried by their depth.
     tries: u32,
     /// The numbers of the places that are contacts.
     taken: [usize; MOST],
@@ -199,22 +202,18 @@ impl Selection<'_, '_> {
 
     /// Computes the places of the chosen candidates at once, at most [`LANES`].
     fn prepare(&mut self) {
-        let mut points = [(0, 0.0); LANES];
+        let (mut open, mut points) = ([Candidate::default(); LANES], [(0, 0.0); LANES]);
         let mut count = 0;
         for &candidate in self.chosen.iter() {
             if self.found.place(candidate).is_none() {
+                open[count] = candidate;
                 points[count] = (self.found.point(candidate), self.found.sign(candidate));
                 count += 1;
             }
         }
         let (elements, solid, level) = (self.elements, self.solid, self.level);
-        let mut n = 0;
-        places_at(elements, solid, level, &points[..count], |place| {
-            while self.found.place(self.chosen[n]).is_some() {
-                n += 1;
-            }
-            self.keep(self.chosen[n], place);
-            n += 1;
+        places_at(elements, solid, level, &points[..count], |n, place| {
+            self.keep(open[n], place);
         });
     }
 
@@ -287,8 +286,8 @@ impl Selection<'_, '_> {
     /// Takes the place of a candidate that continues a contact of the last frame: of the same point or,
     /// without that, near the contact.
     fn continue_from(&mut self, (known, point): (&ShapeContact, usize)) {
-        let continues =
-            |own: &Met| ShapeHint::continues(known, &own.contact(self.elements), self.elements.band(own.i));
+        let elements = self.elements;
+        let continues = |own: &Met| ShapeHint::continues(known, &own.contact(elements), elements.band(own.i));
         if self.count == MOST || self.taken().any(continues) {
             return;
         }
@@ -307,7 +306,7 @@ impl Selection<'_, '_> {
                 return;
             }
             if let Some(own) = self.place(candidate)
-                && ShapeHint::continues(known, &self.places[own].contact(self.elements), band)
+                && continues(&self.places[own])
                 && self.is_free(own)
             {
                 self.take(own);
@@ -316,12 +315,14 @@ impl Selection<'_, '_> {
         }
     }
 
-    /// Takes further contacts, in rounds. A round chooses the disc or ball that is furthest from all contacts,
-    /// then always the one furthest from these and from those chosen. One more is chosen than there is room
-    /// for, as some have no place, or one that is not apart from a contact.
+    /// Takes further contacts, in rounds. A round always chooses the disc or ball that is furthest from the
+    /// contacts and from those already chosen. One more is chosen than there is room for, and one more for
+    /// each that was refused before: it has no place, or one that is not apart from the contacts.
     fn spread_out(&mut self) {
+        let mut spare = 1;
         while self.count < MOST {
-            let (wanted, before) = (MOST - self.count + 1, self.count);
+            let before = self.count;
+            let wanted = (MOST - before + spare).min(LANES);
             let mut contacts = [[0.0; 3]; MOST];
             for (at, met) in contacts.iter_mut().zip(self.taken()) {
                 *at = single(&met.place.point);
@@ -334,14 +335,13 @@ impl Selection<'_, '_> {
                     && self.count < MOST
                     && self.is_free(own)
                 {
-                    self.taken[self.count] = own;
-                    self.count += 1;
+                    self.take(own);
                 }
             }
-            // Those beside a candidate that was not taken come back.
-            if self.chosen.len() < wanted && self.count - before == self.chosen.len() {
+            if self.chosen.is_empty() {
                 return;
             }
+            spare += self.chosen.len() - (self.count - before);
         }
     }
 
@@ -354,10 +354,8 @@ impl Selection<'_, '_> {
 
     /// Adds a place to the contacts.
     fn take(&mut self, own: usize) {
-        let met = self.places[own];
         self.taken[self.count] = own;
         self.count += 1;
-        self.found.separate(self.level, single(&met.place.point), met.i);
     }
 }
 
@@ -411,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_are_those_of_a_selection_among_all_places() {
+    fn contacts_are_places_far_from_each_other() {
         let mesh = dragon_mesh(Dragon::Points5k).unwrap();
         // A strip of random width, whose borders are not straight.
         let rng = &mut rng(5);
@@ -493,6 +491,14 @@ mod tests {
             };
             let taken: Vec<Met> = out.iter().map(own).collect();
             let free = Free { elements: &elements, near: &near };
+            for (n, met) in taken.iter().enumerate() {
+                let apart = taken[..n].iter().map(|it| (it.place.point - met.place.point).norm());
+                let least = f64::from(SPREAD * elements.arrays.radii[met.i]) * (1.0 - 1e-9);
+                assert!(
+                    n == 0 || apart.fold(f64::MAX, f64::min) >= least,
+                    "{name}, round {round}: {met:?} is too near another contact"
+                );
+            }
             if taken.len() < MOST {
                 let left = free.next(&taken);
                 assert!(left.is_none(), "{name}, round {round}: room for {left:?}");
@@ -514,16 +520,15 @@ mod tests {
     }
 
     impl Free<'_, '_> {
-        /// The place that is apart from all contacts whose disc or ball is furthest from them.
+        /// Of the places that are apart from all contacts, the one whose disc or ball is furthest.
         fn next(&self, taken: &[Met]) -> Option<Met> {
             let apart = |met: &Met| {
                 let centre = self.elements.position(met.i);
                 let away =
                     |x: Vector| taken.iter().map(|it| (x - it.place.point).norm()).fold(f64::MAX, f64::min);
-                let of_centres = taken.iter().map(|it| (centre - self.elements.position(it.i)).norm());
                 let least = f64::from(SPREAD * self.elements.arrays.radii[met.i]) * (1.0 + 1e-4);
-                let away = [away(met.place.point), away(centre), of_centres.fold(f64::MAX, f64::min)];
-                (away.into_iter().fold(f64::MAX, f64::min) > least).then_some((away[1], *met))
+                let [away, of_centre] = [away(met.place.point), away(centre)];
+                (away.min(of_centre) > least).then_some((of_centre, *met))
             };
             self.near.iter().filter_map(apart).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, met)| met)
         }

@@ -60,7 +60,7 @@ impl SharpBox {
             on_disc = sum(on_disc, foot[k].scale_all(radius.splat_all(self.axes[k])));
         }
         // The core ends at the surface of the shape, so a place over the disc is one of the core.
-        let is_beside = radius.is_less(radius);
+        let is_beside = radius.nowhere();
         Over { is_over, on_disc, depth: -height, is_beside, apart: dot(beyond, beyond).sqrt() }
     }
 
@@ -83,7 +83,7 @@ impl SharpBox {
     fn lowest_of_faces<L: Lane>(&self, seen: &Seen<L>) -> (L::Mask, [L; 3]) {
         let &Seen { out, radius, away, squares } = seen;
         let (zero, one, level) = (radius.splat(0.0), radius.splat(1.0), radius.splat(LEVEL));
-        let mut is_found = zero.is_less(zero);
+        let mut is_found = zero.nowhere();
         let mut lowest = [zero; 3];
         // The face across axis k that looks down, at the place of the rim where it is lowest. The box is
         // above the plane of the face, so no other place is lower.
@@ -123,7 +123,7 @@ impl SharpBox {
         let beyond = dot(away, away) - radius * radius;
         // Heights over the centre of the box, and the places in half edges from there.
         let (mut least, mut lowest) = (radius.splat(f64::INFINITY), [zero; 3]);
-        let mut is_found = zero.is_less(zero);
+        let mut is_found = zero.nowhere();
         for [a, b] in EDGES {
             for k in 0..3 {
                 let (i, j) = ((k + 1) % 3, (k + 2) % 3);

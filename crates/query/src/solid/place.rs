@@ -81,20 +81,20 @@ pub(crate) fn over_disc(
     out: Vector,
     (most, margin): (f64, f64),
 ) -> Option<Place> {
-    within(solid, || *disc, deepest(solid, disc, out)?, (most, margin))
+    within(solid, disc, deepest(solid, disc, out)?, (most, margin))
 }
 
 /// The deepest place over a disc, with the conditions of [`over_disc`].
 #[inline]
 pub(crate) fn within(
     solid: &Solid<'_>,
-    disc: impl FnOnce() -> FlatDisc,
+    disc: &FlatDisc,
     found: Deepest,
     (most, margin): (f64, f64),
 ) -> Option<Place> {
     let Deepest { place, is_beside, apart } = found;
     let is_within = place.depth >= solid.radius - most && (!is_beside || place.depth >= -margin);
-    (is_within && (apart <= most || solid.reaches(&disc(), most).is_some())).then_some(place)
+    (is_within && (apart <= most || solid.reaches(disc, most).is_some())).then_some(place)
 }
 
 /// The place of a shape at a disc at the border of a sheet: along the way between the nearest points of core

@@ -2,7 +2,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f64x8};
-use nearmiss_hierarchy::{PointKind, THICKNESS};
+use nearmiss_hierarchy::PointKind;
 use nearmiss_lanes::lane::dot;
 use nearmiss_lanes::wide::Bits;
 
@@ -15,7 +15,8 @@ use crate::solid::place::{Deepest, Place, is_closed, over_discs, place_at, withi
 /// The number of places that are computed at once.
 pub(crate) const LANES: usize = 8;
 
-/// From so many discs on, lanes are faster than one disc after the other.
+/// From so many discs on, lanes are faster than one disc after the other: eight in lanes take about as long
+/// as two or three alone.
 const FEWEST: usize = 3;
 
 /// Eight discs.
@@ -42,16 +43,15 @@ struct OverBlock {
     beside: u32,
 }
 
-/// Computes the places of a shape at the first eight of `points`, which are given with the signs of their
-/// normals, and calls `each` with one after the other. They have the same bits as those of [`place_at`].
+/// Computes the places of a shape at up to eight points, which are given with the signs of their normals.
+/// Calls `each` with the number of a point and its place. A place has the same bits as that of [`place_at`].
 pub(crate) fn places_at(
     elements: &Elements<'_>,
     solid: &Solid<'_>,
     level: Level,
     points: &[(usize, f64)],
-    mut each: impl FnMut(Option<Place>),
+    mut each: impl FnMut(usize, Option<Place>),
 ) {
-    let points = &points[..points.len().min(LANES)];
     let zeros = [[0.0; LANES]; 3];
     let mut block = DiscBlock { centres: zeros, normals: zeros, radii: [0.0; LANES] };
     let (mut discs, mut first) = (0, None);
@@ -73,10 +73,11 @@ pub(crate) fn places_at(
         ))
     });
     for (lane, &(i, sign)) in points.iter().enumerate() {
-        each(match &found {
+        let place = match &found {
             Some(found) if discs >> lane & 1 == 1 => found.place(elements, solid, (lane, i)),
             _ => place_at(elements, solid, i, sign),
-        });
+        };
+        each(lane, place);
     }
 }
 
@@ -125,8 +126,8 @@ impl OverBlock {
         let is_beside = self.beside >> lane & 1 == 1;
         let found = Deepest { place, is_beside, apart: self.apart[lane] };
         let radius = f64::from(elements.arrays.discs.get(i));
-        let disc = || FlatDisc { centre: elements.position(i), normal: elements.normal(i), radius };
-        let most = solid.radius + elements.margin.max(f64::from(THICKNESS) * radius);
-        within(solid, disc, found, (most, elements.margin))
+        let disc = FlatDisc { centre: elements.position(i), normal, radius };
+        let most = solid.radius + elements.margin.max(disc.thickness());
+        within(solid, &disc, found, (most, elements.margin))
     }
 }
