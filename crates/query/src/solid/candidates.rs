@@ -8,9 +8,12 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, u32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::LeafBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::wide::{Bits, along, bits, seen_from, squared};
+use nearmiss_lanes::wide::{Bits, Vectors, along, bits, load, seen_from, squared};
 
 const WIDTH: usize = LeafBlock::WIDTH;
+
+/// The cosine below which two normals are those of different walls.
+pub(crate) const UNLIKE: f32 = 0.7;
 
 /// The candidates among sixteen consecutive points. Each row of numbers is in one line of the cache.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +21,8 @@ const WIDTH: usize = LeafBlock::WIDTH;
 pub(crate) struct CandidateBlock {
     /// The centres of the discs and balls, in the stored frame.
     pub(crate) centres: [[f32; WIDTH]; 3],
+    /// The normals of the discs, in the direction in which the shape moves out.
+    out: [[f32; WIDTH]; 3],
     /// Upper bounds on the depths, in the stored frame.
     pub(crate) most: [f32; WIDTH],
     /// The squared distances from the nearest contact, or candidate that was chosen; negative infinity in
@@ -45,6 +50,10 @@ pub(crate) struct CandidateBlock {
     borders: u32,
     /// The lanes of the points near a plane.
     slab: u32,
+    /// The lanes of discs.
+    discs: u32,
+    /// The lanes of discs whose normals are unlike those of the contacts.
+    unlike: u32,
 }
 
 /// The lanes of the candidates of a block, as bits.
@@ -55,6 +64,18 @@ pub(crate) struct CandidateLanes {
     pub(crate) turned: u32,
     pub(crate) behind: u32,
     pub(crate) borders: u32,
+    pub(crate) discs: u32,
+}
+
+/// The candidates among which the deepest one is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Among {
+    /// Those that the shape is not behind.
+    Front,
+    /// Those that the shape is behind.
+    Behind,
+    /// The discs of the last [`CandidateBlocks::mark_unlike`].
+    Unlike,
 }
 
 /// The points near a plane.
@@ -82,18 +103,19 @@ pub(crate) struct CandidateBlocks {
 }
 
 impl CandidateBlock {
-    /// Candidates from the point `first` on, with their centres, the bounds of their depths and the distances
-    /// beyond which they give another contact.
+    /// Candidates from the point `first` on, with their centres and normals, the bounds of their depths and
+    /// the distances beyond which they give another contact.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(
         first: usize,
         lanes: CandidateLanes,
-        centres: [[f32; WIDTH]; 3],
+        (centres, [x, y, z]): ([[f32; WIDTH]; 3], Vectors<S>),
         [most, apart]: [f32x16<S>; 2],
     ) -> Self {
-        let CandidateLanes { found, missed, turned, behind, borders } = lanes;
+        let CandidateLanes { found, missed, turned, behind, borders, discs } = lanes;
         Self {
             centres,
+            out: [x.to_array(), y.to_array(), z.to_array()],
             most: most.to_array(),
             away_sq: [f32::INFINITY; WIDTH],
             apart_sq: (apart * apart).to_array(),
@@ -107,13 +129,20 @@ impl CandidateBlock {
             settled: 0,
             borders,
             slab: 0,
+            discs,
+            unlike: 0,
         }
     }
 
-    /// The candidates before or behind the surface whose place is not known, as bits.
+    /// The candidates among some whose place is not known, as bits.
     #[inline(always)]
-    fn by_depth(&self, is_front: bool) -> u32 {
-        self.lanes & !self.placed & if is_front { !self.behind } else { self.behind }
+    fn by_depth(&self, among: Among) -> u32 {
+        let lanes = match among {
+            Among::Front => !self.behind,
+            Among::Behind => self.behind,
+            Among::Unlike => self.unlike,
+        };
+        self.lanes & !self.placed & lanes
     }
 }
 
@@ -219,8 +248,8 @@ impl CandidateBlocks {
 
     /// All candidates whose place is not known, each with a key that orders them by their depth, the first
     /// one last.
-    pub(crate) fn ordered(&self, is_front: bool) -> impl Iterator<Item = (u64, Candidate)> {
-        self.lanes(move |block| block.by_depth(is_front)).map(move |candidate| {
+    pub(crate) fn ordered(&self, among: Among) -> impl Iterator<Item = (u64, Candidate)> {
+        self.lanes(move |block| block.by_depth(among)).map(move |candidate| {
             let (block, lane) = self.at(candidate);
             // The bits of floats in their order.
             let bits = block.most[lane].to_bits();
@@ -234,22 +263,22 @@ impl CandidateBlocks {
         all.flat_map(move |(n, block)| Bits(of(block)).map(move |lane| Candidate(id32(n * WIDTH + lane))))
     }
 
-    /// The candidate with the greatest bound of its depth, among those before or behind the surface whose
-    /// place is not known. O(n), as the next ones.
-    pub(crate) fn first(&self, level: Level, is_front: bool) -> Option<Candidate> {
+    /// The candidate with the greatest bound of its depth, among some whose place is not known. O(n), as the
+    /// next ones.
+    pub(crate) fn first(&self, level: Level, among: Among) -> Option<Candidate> {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.first_by(simd, is_front),
+            || self.first_by(simd, among),
         ))
     }
 
     #[inline(always)]
-    fn first_by<S: Simd>(&self, simd: S, is_front: bool) -> Option<Candidate> {
+    fn first_by<S: Simd>(&self, simd: S, among: Among) -> Option<Candidate> {
         let mut deepest = Greatest::none(simd);
         for &number in &self.order {
             let block = &self.blocks[number as usize];
             let most = f32x16::load_array_ref(simd, &block.most);
-            deepest.offer(simd, among(simd, most, block.by_depth(is_front)), number);
+            deepest.offer(simd, in_lanes(simd, most, block.by_depth(among)), number);
         }
         deepest.candidate(&self.blocks)
     }
@@ -290,7 +319,7 @@ impl CandidateBlocks {
                     for &at in contacts {
                         away_sq = away_sq.min(squared(seen_from(simd, &block.centres, at)));
                     }
-                    among(simd, away_sq, block.lanes)
+                    in_lanes(simd, away_sq, block.lanes)
                 };
                 block.away_sq = away_sq.to_array();
                 let is_apart: mask32x16<S> = away_sq.simd_gt(f32x16::load_array_ref(simd, &block.apart_sq));
@@ -350,11 +379,36 @@ impl CandidateBlocks {
             block.slab = bits(is_level) & (block.lanes | block.missed);
             let away = seen_from(simd, &block.centres, slab.inside);
             let up = along(away, slab.normal);
-            nearness = nearness.max(among(simd, up * up - squared(away), block.slab));
+            nearness = nearness.max(in_lanes(simd, up * up - squared(away), block.slab));
             let depths = f32x16::load_array_ref(simd, &block.most);
-            most = most.max(among(simd, depths, block.slab & block.lanes));
+            most = most.max(in_lanes(simd, depths, block.slab & block.lanes));
         }
         [most.reduce_max(), -nearness.reduce_max()]
+    }
+
+    /// Marks the discs whose normals make more than about 45° with each of these. Returns `true` if there are
+    /// any. O(n).
+    pub(crate) fn mark_unlike(&mut self, level: Level, normals: &[[f32; 3]]) -> bool {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.mark_unlike_by(simd, normals),
+        ))
+    }
+
+    #[inline(always)]
+    fn mark_unlike_by<S: Simd>(&mut self, simd: S, normals: &[[f32; 3]]) -> bool {
+        let mut any = 0;
+        for block in &mut self.blocks {
+            let out = load(simd, &block.out);
+            let mut cosine = f32x16::splat(simd, f32::NEG_INFINITY);
+            for &normal in normals {
+                cosine = cosine.max(along(out, normal));
+            }
+            let is_unlike: mask32x16<S> = cosine.simd_lt(UNLIKE);
+            block.unlike = bits(is_unlike) & block.lanes & block.discs;
+            any |= block.unlike;
+        }
+        any != 0
     }
 
     /// The points near the plane of the last [`Self::mark_slab`].
@@ -377,7 +431,7 @@ impl CandidateBlocks {
             let excepted = |&i: &u32| 1_u32.checked_shl(i.wrapping_sub(block.first)).unwrap_or(0);
             let lanes = block.lanes & !except.iter().map(excepted).fold(0, |all, own| all | own);
             let away_sq = squared(seen_from(simd, &block.centres, at));
-            let least = -among(simd, -away_sq, lanes).reduce_max();
+            let least = -in_lanes(simd, -away_sq, lanes).reduce_max();
             let is_least: mask32x16<S> = away_sq.simd_eq(least);
             let Some(lane) = Bits(bits(is_least) & lanes).next() else { continue };
             let own = (least, block.first + id32(lane));
@@ -443,7 +497,7 @@ pub(crate) fn single(v: &Vector3<f64>) -> [f32; 3] {
 
 /// The numbers in `lanes`, and negative infinity in the others.
 #[inline(always)]
-fn among<S: Simd>(simd: S, numbers: f32x16<S>, lanes: u32) -> f32x16<S> {
+fn in_lanes<S: Simd>(simd: S, numbers: f32x16<S>, lanes: u32) -> f32x16<S> {
     let is_there = mask32x16::from_bitmask(simd, u64::from(lanes));
     is_there.select(numbers, f32x16::splat(simd, f32::NEG_INFINITY))
 }
@@ -474,19 +528,20 @@ mod tests {
                     missed: 0,
                     turned: 0,
                     borders: 0,
+                    discs: 0,
                     behind: rng.random_range(0..1 << WIDTH),
                 };
                 // Many are equal.
                 let numbers = [(); WIDTH].map(|()| [0.5, -1.0, 2.0, f32::INFINITY][rng.random_range(0..4)]);
                 let block = dispatch!(Level::new(), simd => {
                     let depths = f32x16::load_array(simd, numbers);
-                    CandidateBlock::new(first, lanes, [[0.0; WIDTH]; 3], [depths, depths])
+                    CandidateBlock::new(first, lanes, ([[0.0; WIDTH]; 3], [depths; 3]), [depths, depths])
                 });
                 found.push(block);
             }
             found.arrange();
-            for is_front in [true, false] {
-                let all = found.lanes(|block| block.by_depth(is_front));
+            for among in [Among::Front, Among::Behind] {
+                let all = found.lanes(|block| block.by_depth(among));
                 let mut expected: Vec<(f32, usize)> = all
                     .map(|candidate| {
                         let (block, lane) = found.at(candidate);
@@ -495,23 +550,23 @@ mod tests {
                     .collect();
                 expected.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
                 let expected: Vec<usize> = expected.into_iter().map(|(_, i)| i).collect();
-                let heap: BinaryHeap<(u64, Candidate)> = found.ordered(is_front).collect();
+                let heap: BinaryHeap<(u64, Candidate)> = found.ordered(among).collect();
                 let ordered: Vec<usize> = heap
                     .into_sorted_vec()
                     .iter()
                     .rev()
                     .map(|&(_, candidate)| found.point(candidate))
                     .collect();
-                assert_eq!(ordered, expected, "round {round}, {is_front}");
+                assert_eq!(ordered, expected, "round {round}, {among:?}");
                 for level in levels() {
                     let mut left = found.clone();
                     let one_by_one: Vec<usize> = std::iter::from_fn(|| {
-                        let candidate = left.first(level, is_front)?;
+                        let candidate = left.first(level, among)?;
                         left.remove(candidate);
                         Some(left.point(candidate))
                     })
                     .collect();
-                    assert_eq!(one_by_one, expected, "round {round}, {is_front}, {level:?}");
+                    assert_eq!(one_by_one, expected, "round {round}, {among:?}, {level:?}");
                 }
             }
         }
@@ -535,12 +590,13 @@ mod tests {
             let (mut found, mut all) = (CandidateBlocks::default(), Vec::new());
             for &first in &firsts {
                 let places = [(); WIDTH].map(|()| place());
-                let lanes = CandidateLanes { found: 0xb7ff, missed: 0, turned: 0, borders: 0, behind: 0 };
+                let lanes =
+                    CandidateLanes { found: 0xb7ff, missed: 0, turned: 0, borders: 0, behind: 0, discs: 0 };
                 all.extend(Bits(lanes.found).map(|lane| (first + lane, places[lane])));
                 let centres = [0, 1, 2].map(|k| places.map(|place| place[k]));
                 found.push(dispatch!(Level::new(), simd => {
                     let apart = f32x16::splat(simd, 2.0);
-                    CandidateBlock::new(first, lanes, centres, [apart, apart])
+                    CandidateBlock::new(first, lanes, (centres, [apart; 3]), [apart, apart])
                 }));
             }
             all.sort_by_key(|&(i, _)| i);

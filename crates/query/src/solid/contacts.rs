@@ -1,8 +1,8 @@
 //! The contact manifold of a shape and a scan: up to eight points, each with a normal and a depth.
 //!
 //! Each disc that the shape touches can give one contact, the deepest place of the shape over the disc.
-//! Each ball can give one along the way from its centre. The deepest is selected first, then those that
-//! continue contacts of the last frame, then those whose discs or balls are furthest from all before. A shape
+//! Each ball can give one along the way from its centre. The deepest is selected first, then the deepest of
+//! other walls, then those that continue contacts of the last frame, then those whose discs or balls are furthest from all before. A shape
 //! may touch hundreds of discs, so a place is computed only where the selection depends on it: the bounds of
 //! [`gather`](crate::solid::gather) tell where the deepest may be.
 
@@ -13,11 +13,12 @@ use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointKind;
 use nearmiss_lanes::id32;
+use nearmiss_lanes::vector::dot;
 
 use crate::ask::options::Detail;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
-use crate::solid::candidates::{Candidate, CandidateBlocks, single};
+use crate::solid::candidates::{Among, Candidate, CandidateBlocks, UNLIKE, single};
 use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
@@ -37,6 +38,9 @@ const LEVEL: f64 = 0.01;
 
 /// Candidates that are looked for one by one, before all others are ordered.
 const SCANS: u32 = 8;
+
+/// Further walls whose deepest place is a contact.
+const OTHER_WALLS: usize = 3;
 
 /// Candidates that are compared with a contact of the last frame.
 const TRIES: usize = 3;
@@ -154,18 +158,19 @@ pub(crate) fn contacts(
 impl Selection<'_, '_> {
     fn run(&mut self, hint: Option<&ShapeHint>) {
         // Behind a thin plate there is another surface, which would push the shape through.
-        let deepest = match self.deepest(true) {
+        let deepest = match self.deepest(Among::Front) {
             Some(front) => {
                 self.found.remove_behind();
                 Some(front)
             }
-            None => self.deepest(false),
+            None => self.deepest(Among::Behind),
         };
         match deepest {
             // A shape that touches has a contact.
             None => self.take_beside(),
             Some(number) => {
                 self.take(number);
+                self.take_other_walls();
                 self.continue_all(hint);
                 self.spread_out();
             }
@@ -229,12 +234,39 @@ impl Selection<'_, '_> {
         Some(number)
     }
 
-    /// Returns the number of the deepest place, up to [`LEVEL`], of those before or behind the surface.
-    /// Computes places as long as another one may be deeper.
-    fn deepest(&mut self, is_front: bool) -> Option<usize> {
+    /// Takes the deepest place of each wall whose normals are unlike those of the contacts. In a corner, those
+    /// that are far from each other need not be deep in any wall but the first.
+    fn take_other_walls(&mut self) {
+        for _ in 0..OTHER_WALLS {
+            let mut normals = [[0.0; 3]; MOST];
+            for (normal, met) in normals.iter_mut().zip(self.taken()) {
+                *normal = single(&met.place.normal);
+            }
+            let normals = &normals[..self.count];
+            if !self.found.mark_unlike(self.level, normals) {
+                return;
+            }
+            let is_unlike = |met: &Met| {
+                let normal = single(&met.place.normal);
+                normals.iter().all(|&other| dot(normal, other) < UNLIKE)
+            };
+            let known = (0..self.places.len()).filter(|&n| is_unlike(&self.places[n]));
+            let known = known.max_by(|&a, &b| self.places[a].deeper(&self.places[b]));
+            let found = self.deepest(Among::Unlike).into_iter().chain(known);
+            let deepest = found.max_by(|&a, &b| self.places[a].deeper(&self.places[b]));
+            match deepest.filter(|&own| self.is_free(own)) {
+                Some(own) => self.take(own),
+                None => return,
+            }
+        }
+    }
+
+    /// Returns the number of the deepest place, up to [`LEVEL`], of some candidates. Computes places as long
+    /// as another one may be deeper.
+    fn deepest(&mut self, among: Among) -> Option<usize> {
         let mut best: Option<usize> = None;
         self.tries = 0;
-        while let Some(candidate) = self.next(is_front) {
+        while let Some(candidate) = self.next(among) {
             if let Some(Met { place, i, .. }) = best.map(|best| &self.places[best]) {
                 let local = f64::from(self.elements.arrays.radii[*i]);
                 if place.depth + LEVEL * local >= self.found.most(candidate) {
@@ -259,14 +291,14 @@ impl Selection<'_, '_> {
     }
 
     /// Returns the next candidate by its depth. The caller computes its place, or lowers its bound.
-    fn next(&mut self, is_front: bool) -> Option<Candidate> {
+    fn next(&mut self, among: Among) -> Option<Candidate> {
         self.tries += 1;
         if self.tries <= SCANS {
-            return self.found.first(self.level, is_front);
+            return self.found.first(self.level, among);
         }
         if self.tries == SCANS + 1 {
             self.order.clear();
-            self.order.extend(self.found.ordered(is_front));
+            self.order.extend(self.found.ordered(among));
         }
         self.order.pop().map(|(_, candidate)| candidate)
     }

@@ -106,10 +106,10 @@ impl Gather<'_, '_> {
         let is_missed: mask32x16<S> = depths.simd_lt(least);
         let missed = turned.lanes & bits(is_missed);
         let Turned { lanes, turned, behind, .. } = turned;
-        let lanes = CandidateLanes { found: lanes & !missed, missed, turned, behind, borders };
+        let lanes = CandidateLanes { found: lanes & !missed, missed, turned, behind, borders, discs };
         let apart = elements.local_radii(simd, first, count) * SPREAD;
         let centres = elements.positions(first, count);
-        self.found.push(CandidateBlock::new(first, lanes, centres, [depths, apart]));
+        self.found.push(CandidateBlock::new(first, lanes, (centres, out), [depths, apart]));
     }
 }
 

@@ -63,8 +63,10 @@ pub(crate) fn refine(
             x = elements.in_world(&point);
             continue;
         }
-        // A shape that is beside this place has no depth there.
-        let least = -elements.margin.max(f64::from(THICKNESS) * radius);
+        // A shape that is beside this place has no depth there. Whether it touches does not depend on the margin.
+        let thick = f64::from(THICKNESS) * radius;
+        let touches = contact.depth >= -thick * elements.scale();
+        let least = if touches { -thick } else { -elements.margin.max(thick) };
         if let Some(Place { normal, depth, .. }) =
             deepest(FlatDisc { radius: PLACE * radius, ..disc }).filter(|found| found.depth >= least)
         {

@@ -6,6 +6,7 @@ mod batch;
 mod broken_shapes;
 mod clashes;
 mod coherence;
+mod corners;
 mod curves;
 mod curves_hard;
 mod cut;
