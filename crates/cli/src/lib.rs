@@ -361,11 +361,21 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
         Err(mut refused) => {
             suggest_output(&mut refused);
+            suggest_quotes(&mut refused);
             // Help and version go to standard output, errors to standard error. A closed pipe is
             // ignored.
             let _ = refused.print();
             ExitCode::from(u8::try_from(refused.exit_code()).unwrap_or(2))
         }
+    }
+}
+
+/// Adds a suggestion to quote several numbers if one was given as an argument of its own.
+fn suggest_quotes(refused: &mut clap::Error) {
+    let Some(ContextValue::String(extra)) = refused.get(ContextKind::InvalidArg) else { return };
+    if refused.kind() == ErrorKind::UnknownArgument && extra.parse::<f64>().is_ok() {
+        let tip = r#"to give an option several numbers, make them one argument: `--pose="0 0 1 0 0 0 1"`, `--from=0,0,1`"#;
+        refused.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.to_owned().into()]));
     }
 }
 

@@ -37,7 +37,8 @@ pub struct TouchArgs {
     ///
     /// Shapes are tested against the obstacle: tangent discs where points sample a sheet, small balls
     /// about all other points. Contact normals point outwards if the scan is oriented (`preprocess
-    /// --graph`), otherwise to the side on which the shape's centre lies.
+    /// --graph`, or `--scanner` for a room, whose normals point inwards then), otherwise to the side on
+    /// which the shape's centre lies.
     #[arg(long)]
     pub surface: bool,
     /// Test against balls of this radius about the points instead of the surface, with the same report
