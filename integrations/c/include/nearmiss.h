@@ -1641,8 +1641,8 @@ NearmissStatus nearmiss_shape_distance(const struct NearmissPlan *plan,
 
 /*
  Writes the contacts of a shape with a scan to `out`, as many as its capacity holds, and their number,
- at most eight, to `count`. The first is the deepest; each of the others is the candidate furthest from
- all earlier ones. The list is empty if the pose or the shape is out of range; `nearmiss_touch` is then
+ at most eight, to `count`. The first is the deepest; the others are spread out, at least half a local
+ radius apart. The list is empty if the pose or the shape is out of range; `nearmiss_touch` is then
  undecided. `hint` may be null. Thread safety: one call at a time for each scratch and each hint.
 
  # Safety
