@@ -109,7 +109,11 @@ fn outputs_that_cannot_be_are_refused_before_the_work() {
     std::fs::create_dir(place.path("folder")).unwrap();
     place.refused(2, &["collide", "ball.xyz", "ball.xyz", "--image", "out.jpg"], &["out.jpg", ".png"]);
     place.refused(2, &["preprocess", "ball.xyz", "out.nm"], &["use `-o out.nm`"]);
-    place.refused(2, &["touch", "ball.nm", "--shapes", "s", "--pose", "0", "0", "1"], &["make them one argument"]);
+    place.refused(
+        2,
+        &["touch", "ball.nm", "--shapes", "s", "--pose", "0", "0", "1"],
+        &["make them one argument"],
+    );
     for (output, word) in [("folder", "got a folder"), ("nowhere/out", "no folder nowhere")] {
         place.refused(1, &["preprocess", "ball.xyz", "-o", output], &[output, word]);
         place.refused(1, &["export", "ball.xyz", "--radii", output], &[output, word]);

@@ -13,7 +13,7 @@ use nearmiss_lanes::wide::{Bits, Vectors, along, bits, load, seen_from, squared}
 const WIDTH: usize = LeafBlock::WIDTH;
 
 /// The cosine below which two normals are those of different walls.
-pub(crate) const UNLIKE: f32 = 0.7;
+const UNLIKE: f32 = 0.7;
 
 /// The candidates among sixteen consecutive points. Each row of numbers is in one line of the cache.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +21,7 @@ pub(crate) const UNLIKE: f32 = 0.7;
 pub(crate) struct CandidateBlock {
     /// The centres of the discs and balls, in the stored frame.
     pub(crate) centres: [[f32; WIDTH]; 3],
-    /// The normals of the discs, in the direction in which the shape moves out.
+    /// The normals of discs, in the direction in which the shape moves out.
     out: [[f32; WIDTH]; 3],
     /// Upper bounds on the depths, in the stored frame.
     pub(crate) most: [f32; WIDTH],
@@ -52,8 +52,6 @@ pub(crate) struct CandidateBlock {
     slab: u32,
     /// The lanes of discs.
     discs: u32,
-    /// The lanes of discs whose normals are unlike those of the contacts.
-    unlike: u32,
 }
 
 /// The lanes of the candidates of a block, as bits.
@@ -74,8 +72,6 @@ pub(crate) enum Among {
     Front,
     /// Those that the shape is behind.
     Behind,
-    /// The discs of the last [`CandidateBlocks::mark_unlike`].
-    Unlike,
 }
 
 /// The points near a plane.
@@ -130,7 +126,6 @@ impl CandidateBlock {
             borders,
             slab: 0,
             discs,
-            unlike: 0,
         }
     }
 
@@ -140,7 +135,6 @@ impl CandidateBlock {
         let lanes = match among {
             Among::Front => !self.behind,
             Among::Behind => self.behind,
-            Among::Unlike => self.unlike,
         };
         self.lanes & !self.placed & lanes
     }
@@ -201,7 +195,7 @@ impl CandidateBlocks {
 
     /// Sets the number of the place of a candidate before or behind the surface, or of a point that the
     /// shape is beside. Its depth ranks it.
-    pub(crate) fn settle(&mut self, candidate: Candidate, number: usize, depth: f64) {
+    pub(crate) fn settle(&mut self, candidate: Candidate, number: usize, (depth, normal): (f64, [f32; 3])) {
         let Candidate(n) = candidate;
         let (block, lane) = (&mut self.blocks[n as usize / WIDTH], n as usize % WIDTH);
         block.settled |= 1 << lane;
@@ -209,6 +203,9 @@ impl CandidateBlocks {
         block.lanes |= 1 << lane;
         block.missed &= !(1 << lane);
         block.behind &= !(1 << lane);
+        for k in 0..3 {
+            block.out[k][lane] = normal[k];
+        }
         self.set_most(candidate, depth);
     }
 
@@ -283,6 +280,50 @@ impl CandidateBlocks {
         deepest.candidate(&self.blocks)
     }
 
+    /// Adds the disc with the greatest bound of its depth to `chosen`, of those whose normals make more than
+    /// about 45° with all of `normals`, then the same with the normal of that one, up to `wanted`. Those that
+    /// are added are no longer candidates. O(n) each.
+    pub(crate) fn choose_walls(
+        &mut self,
+        level: Level,
+        normals: &mut Vec<[f32; 3]>,
+        (wanted, chosen): (usize, &mut Vec<Candidate>),
+    ) {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.choose_walls_by(simd, normals, (wanted, chosen)),
+        ));
+    }
+
+    #[inline(always)]
+    fn choose_walls_by<S: Simd>(
+        &mut self,
+        simd: S,
+        normals: &mut Vec<[f32; 3]>,
+        (wanted, chosen): (usize, &mut Vec<Candidate>),
+    ) {
+        let none = f32x16::splat(simd, f32::NEG_INFINITY);
+        for _ in 0..wanted {
+            let mut deepest = Greatest::none(simd);
+            for &number in &self.order {
+                let block = &self.blocks[number as usize];
+                let (out, mut cosine) = (load(simd, &block.out), none);
+                for &normal in &*normals {
+                    cosine = cosine.max(along(out, normal));
+                }
+                let is_unlike: mask32x16<S> = cosine.simd_lt(UNLIKE);
+                let most = f32x16::load_array_ref(simd, &block.most);
+                let most = in_lanes(simd, most, block.lanes & block.discs);
+                deepest.offer(simd, is_unlike.select(most, none), number);
+            }
+            let Some(first) = deepest.candidate(&self.blocks) else { return };
+            self.remove(first);
+            let (block, lane) = self.at(first);
+            normals.push([0, 1, 2].map(|k| block.out[k][lane]));
+            chosen.push(first);
+        }
+    }
+
     /// Adds up to `wanted` candidates to `chosen`. Each is the furthest from the contacts and from those
     /// added before, and apart from all of these. Candidates that are added are no longer candidates. O(n)
     /// each.
@@ -334,7 +375,7 @@ impl CandidateBlocks {
     }
 
     /// The centre of a candidate.
-    fn centre(&self, candidate: Candidate) -> [f32; 3] {
+    pub(crate) fn centre(&self, candidate: Candidate) -> [f32; 3] {
         let (block, lane) = self.at(candidate);
         [0, 1, 2].map(|k| block.centres[k][lane])
     }
@@ -384,31 +425,6 @@ impl CandidateBlocks {
             most = most.max(in_lanes(simd, depths, block.slab & block.lanes));
         }
         [most.reduce_max(), -nearness.reduce_max()]
-    }
-
-    /// Marks the discs whose normals make more than about 45° with each of these. Returns `true` if there are
-    /// any. O(n).
-    pub(crate) fn mark_unlike(&mut self, level: Level, normals: &[[f32; 3]]) -> bool {
-        dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
-            || self.mark_unlike_by(simd, normals),
-        ))
-    }
-
-    #[inline(always)]
-    fn mark_unlike_by<S: Simd>(&mut self, simd: S, normals: &[[f32; 3]]) -> bool {
-        let mut any = 0;
-        for block in &mut self.blocks {
-            let out = load(simd, &block.out);
-            let mut cosine = f32x16::splat(simd, f32::NEG_INFINITY);
-            for &normal in normals {
-                cosine = cosine.max(along(out, normal));
-            }
-            let is_unlike: mask32x16<S> = cosine.simd_lt(UNLIKE);
-            block.unlike = bits(is_unlike) & block.lanes & block.discs;
-            any |= block.unlike;
-        }
-        any != 0
     }
 
     /// The points near the plane of the last [`Self::mark_slab`].

@@ -8,17 +8,17 @@
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointKind;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::vector::dot;
 
 use crate::ask::options::Detail;
 use crate::pair::placed::ViewScratch;
 use crate::solid::answer::ShapeContact;
-use crate::solid::candidates::{Among, Candidate, CandidateBlocks, UNLIKE, single};
+use crate::solid::candidates::{Among, Candidate, CandidateBlocks, single};
 use crate::solid::core::Solid;
 use crate::solid::descent::Near;
 use crate::solid::elements::Elements;
@@ -39,7 +39,7 @@ const LEVEL: f64 = 0.01;
 /// Candidates that are looked for one by one, before all others are ordered.
 const SCANS: u32 = 8;
 
-/// Further walls whose deepest place is a contact.
+/// Further walls that have a contact where they are deepest.
 const OTHER_WALLS: usize = 3;
 
 /// Candidates that are compared with a contact of the last frame.
@@ -48,15 +48,13 @@ const TRIES: usize = 3;
 /// Evaluations that move the deepest contact over the surface.
 const SLIDES: u32 = 3;
 
-/// The contacts of the last frame, and those that there is room for, are computed at once.
-const _: () = assert!(MOST <= LANES);
-
 /// Reusable memory.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Candidates {
     found: CandidateBlocks,
     places: Vec<Met>,
     chosen: Vec<Candidate>,
+    directions: Vec<[f32; 3]>,
     order: BinaryHeap<(u64, Candidate)>,
     ends: SheetEnds,
 }
@@ -79,6 +77,8 @@ struct Selection<'s, 'a> {
     places: &'s mut Vec<Met>,
     /// Candidates whose places are computed at once.
     chosen: &'s mut Vec<Candidate>,
+    /// The normals of the walls that have contacts, or candidates that are chosen.
+    directions: &'s mut Vec<[f32; 3]>,
     /// The candidates by depth, once so many have been tried.
     order: &'s mut BinaryHeap<(u64, Candidate)>,
     /// The number of candidates that have been tried by their depth.
@@ -102,7 +102,7 @@ pub(crate) fn contacts(
         let own = hint.as_deref().and_then(|hint| hint.centre);
         let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
         let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
-        let Candidates { found, places, chosen, order, ends } = candidates;
+        let Candidates { found, places, chosen, directions, order, ends } = candidates;
         found.clear();
         places.clear();
         // About a longer core the clearance of the centre rarely tells more than the list of boxes.
@@ -124,6 +124,7 @@ pub(crate) fn contacts(
             found,
             places,
             chosen,
+            directions,
             order,
             tries: 0,
             taken: [0; MOST],
@@ -170,9 +171,7 @@ impl Selection<'_, '_> {
             None => self.take_beside(),
             Some(number) => {
                 self.take(number);
-                self.take_other_walls();
-                self.continue_all(hint);
-                self.spread_out();
+                self.spread_out(hint);
             }
         }
     }
@@ -234,33 +233,6 @@ impl Selection<'_, '_> {
         Some(number)
     }
 
-    /// Takes the deepest place of each wall whose normals are unlike those of the contacts. In a corner, those
-    /// that are far from each other need not be deep in any wall but the first.
-    fn take_other_walls(&mut self) {
-        for _ in 0..OTHER_WALLS {
-            let mut normals = [[0.0; 3]; MOST];
-            for (normal, met) in normals.iter_mut().zip(self.taken()) {
-                *normal = single(&met.place.normal);
-            }
-            let normals = &normals[..self.count];
-            if !self.found.mark_unlike(self.level, normals) {
-                return;
-            }
-            let is_unlike = |met: &Met| {
-                let normal = single(&met.place.normal);
-                normals.iter().all(|&other| dot(normal, other) < UNLIKE)
-            };
-            let known = (0..self.places.len()).filter(|&n| is_unlike(&self.places[n]));
-            let known = known.max_by(|&a, &b| self.places[a].deeper(&self.places[b]));
-            let found = self.deepest(Among::Unlike).into_iter().chain(known);
-            let deepest = found.max_by(|&a, &b| self.places[a].deeper(&self.places[b]));
-            match deepest.filter(|&own| self.is_free(own)) {
-                Some(own) => self.take(own),
-                None => return,
-            }
-        }
-    }
-
     /// Returns the number of the deepest place, up to [`LEVEL`], of some candidates. Computes places as long
     /// as another one may be deeper.
     fn deepest(&mut self, among: Among) -> Option<usize> {
@@ -303,18 +275,6 @@ impl Selection<'_, '_> {
         self.order.pop().map(|(_, candidate)| candidate)
     }
 
-    /// Takes places that continue contacts of the last frame.
-    fn continue_all(&mut self, hint: Option<&ShapeHint>) {
-        let Some(hint) = hint else { return };
-        self.chosen.clear();
-        let points = hint.contacts_of_points().filter_map(|(_, point)| self.found.of_point(point));
-        self.chosen.extend(points);
-        self.prepare();
-        for known in hint.contacts_of_points() {
-            self.continue_from(known);
-        }
-    }
-
     /// Takes the place of a candidate that continues a contact of the last frame: of the same point or,
     /// without that, near the contact.
     fn continue_from(&mut self, (known, point): (&ShapeContact, usize)) {
@@ -347,33 +307,65 @@ impl Selection<'_, '_> {
         }
     }
 
-    /// Takes further contacts, in rounds. A round always chooses the disc or ball that is furthest from the
-    /// contacts and from those already chosen. One more is chosen than there is room for, and one more for
-    /// each that was refused before: it has no place, or one that is not apart from the contacts.
-    fn spread_out(&mut self) {
+    /// Takes further contacts, in rounds. A round chooses the disc of each other wall with the greatest bound
+    /// of its depth, in the first round those of the last frame, then always the disc or ball that is furthest
+    /// from the contacts and from those already chosen. One more is chosen than there is room for, and one more
+    /// for each that was refused before: it has no place, or one that is not apart from the contacts.
+    fn spread_out(&mut self, mut hint: Option<&ShapeHint>) {
         let mut spare = 1;
         while self.count < MOST {
             let before = self.count;
             let wanted = (MOST - before + spare).min(LANES);
-            let mut contacts = [[0.0; 3]; MOST];
-            for (at, met) in contacts.iter_mut().zip(self.taken()) {
-                *at = single(&met.place.point);
-            }
             self.chosen.clear();
-            self.found.choose(self.level, &contacts[..before], (wanted, &mut *self.chosen));
-            self.prepare();
-            for n in 0..self.chosen.len() {
-                if let Some(own) = self.found.place(self.chosen[n])
-                    && self.count < MOST
-                    && self.is_free(own)
-                {
-                    self.take(own);
-                }
+            self.directions.clear();
+            for n in 0..before {
+                self.directions.push(single(&self.places[self.taken[n]].place.normal));
             }
+            let walls = (OTHER_WALLS.min(wanted), &mut *self.chosen);
+            self.found.choose_walls(self.level, self.directions, walls);
+            let walls = self.chosen.len();
+            let known = hint.into_iter().flat_map(ShapeHint::contacts_of_points);
+            let known = known.filter_map(|(_, point)| self.found.of_point(point)).take(LANES - walls);
+            self.chosen.extend(known);
+            let fresh = self.chosen.len();
+            self.choose_furthest(wanted);
+            self.prepare();
+            self.accept(0..walls);
+            for known in hint.take().into_iter().flat_map(ShapeHint::contacts_of_points) {
+                self.continue_from(known);
+            }
+            self.accept(fresh..self.chosen.len());
             if self.chosen.is_empty() {
                 return;
             }
-            spare += self.chosen.len() - (self.count - before);
+            spare += self.chosen.len().saturating_sub(self.count - before);
+        }
+    }
+
+    /// Chooses up to `wanted` candidates in all, each of which is the furthest from the contacts and from those
+    /// already chosen.
+    fn choose_furthest(&mut self, wanted: usize) {
+        let mut centres = [[0.0; 3]; MOST + LANES];
+        let count = self.count + self.chosen.len();
+        for (centre, met) in centres.iter_mut().zip(self.taken()) {
+            *centre = single(&met.place.point);
+        }
+        for (centre, &candidate) in centres[self.count..].iter_mut().zip(self.chosen.iter()) {
+            *centre = self.found.centre(candidate);
+        }
+        let wanted = (wanted.saturating_sub(self.chosen.len()), &mut *self.chosen);
+        self.found.choose(self.level, &centres[..count], wanted);
+    }
+
+    /// Takes the places of some of the chosen candidates that are apart from all contacts.
+    fn accept(&mut self, some: Range<usize>) {
+        for n in some {
+            if let Some(own) = self.found.place(self.chosen[n])
+                && self.count < MOST
+                && self.is_free(own)
+            {
+                self.take(own);
+            }
         }
     }
 

@@ -197,7 +197,7 @@ impl SheetEnds {
             let is_inner = !elements.is_at_border(i);
             let place = if is_past { sheet.past(&disc, &way) } else { sheet.beside(&disc, &way, is_inner) };
             if let Some(place) = place.filter(|_| !found.is_settled(candidate)) {
-                found.settle(candidate, self.places.len(), place.depth);
+                found.settle(candidate, self.places.len(), (place.depth, single(&place.normal)));
                 self.places.push((i, place));
             }
         }
