@@ -289,6 +289,9 @@ impl CandidateBlocks {
         normals: &mut Vec<[f32; 3]>,
         (wanted, chosen): (usize, &mut Vec<Candidate>),
     ) {
+        if wanted == 0 {
+            return;
+        }
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || self.choose_walls_by(simd, normals, (wanted, chosen)),

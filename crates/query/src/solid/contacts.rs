@@ -312,7 +312,7 @@ impl Selection<'_, '_> {
     /// from the contacts and from those already chosen. One more is chosen than there is room for, and one more
     /// for each that was refused before: it has no place, or one that is not apart from the contacts.
     fn spread_out(&mut self, mut hint: Option<&ShapeHint>) {
-        let mut spare = 1;
+        let (mut spare, mut other_walls) = (1, OTHER_WALLS);
         while self.count < MOST {
             let before = self.count;
             let wanted = (MOST - before + spare).min(LANES);
@@ -321,7 +321,7 @@ impl Selection<'_, '_> {
             for n in 0..before {
                 self.directions.push(single(&self.places[self.taken[n]].place.normal));
             }
-            let walls = (OTHER_WALLS.min(wanted), &mut *self.chosen);
+            let walls = (other_walls.min(wanted), &mut *self.chosen);
             self.found.choose_walls(self.level, self.directions, walls);
             let walls = self.chosen.len();
             let known = hint.into_iter().flat_map(ShapeHint::contacts_of_points);
@@ -331,6 +331,8 @@ impl Selection<'_, '_> {
             self.choose_furthest(wanted);
             self.prepare();
             self.accept(0..walls);
+            // Others may stand for those that were refused.
+            other_walls = walls - (self.count - before);
             for known in hint.take().into_iter().flat_map(ShapeHint::contacts_of_points) {
                 self.continue_from(known);
             }
