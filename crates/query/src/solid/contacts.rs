@@ -2,9 +2,9 @@
 //!
 //! Each disc that the shape touches can give one contact, the deepest place of the shape over the disc.
 //! Each ball can give one along the way from its centre. The deepest is selected first, then the deepest of
-//! other walls, then those that continue contacts of the last frame, then those whose discs or balls are furthest from all before. A shape
-//! may touch hundreds of discs, so a place is computed only where the selection depends on it: the bounds of
-//! [`gather`](crate::solid::gather) tell where the deepest may be.
+//! other walls, then those that continue contacts of the last frame, then those whose discs or balls are
+//! furthest from all before. A shape may touch hundreds of discs, so a place is computed only where the
+//! selection depends on it: the bounds of [`gather`](crate::solid::gather) tell where the deepest may be.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -307,10 +307,12 @@ impl Selection<'_, '_> {
         }
     }
 
-    /// Takes further contacts, in rounds. A round chooses the disc of each other wall with the greatest bound
-    /// of its depth, in the first round those of the last frame, then always the disc or ball that is furthest
-    /// from the contacts and from those already chosen. One more is chosen than there is room for, and one more
-    /// for each that was refused before: it has no place, or one that is not apart from the contacts.
+    /// Takes further contacts, in rounds.
+    ///
+    /// The first round chooses the disc with the greatest bound of its depth in each other wall, and those of
+    /// the last frame. All rounds choose the discs or balls that are furthest from the contacts and from
+    /// those already chosen. One more is chosen than there is room for, and one more for each that was
+    /// refused before: it has no place, or one that is not apart from the contacts.
     fn spread_out(&mut self, mut hint: Option<&ShapeHint>) {
         let (mut spare, mut other_walls) = (1, OTHER_WALLS);
         while self.count < MOST {
@@ -344,8 +346,8 @@ impl Selection<'_, '_> {
         }
     }
 
-    /// Chooses up to `wanted` candidates in all, each of which is the furthest from the contacts and from those
-    /// already chosen.
+    /// Chooses up to `wanted` candidates in all, each of which is the furthest from the contacts and from
+    /// those already chosen.
     fn choose_furthest(&mut self, wanted: usize) {
         let mut centres = [[0.0; 3]; MOST + LANES];
         let count = self.count + self.chosen.len();
@@ -546,7 +548,7 @@ mod tests {
     }
 
     impl Free<'_, '_> {
-        /// Of the places that are apart from all contacts, the one whose disc or ball is furthest.
+        /// The place whose disc or ball is furthest, of those that are apart from all contacts.
         fn next(&self, taken: &[Met]) -> Option<Met> {
             let apart = |met: &Met| {
                 let centre = self.elements.position(met.i);

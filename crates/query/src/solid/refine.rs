@@ -63,7 +63,7 @@ pub(crate) fn refine(
             x = elements.in_world(&point);
             continue;
         }
-        // A shape that is beside this place has no depth there. Whether it touches does not depend on the margin.
+        // A shape that is beside this place has no depth there. What touches does not depend on the margin.
         let thick = f64::from(THICKNESS) * radius;
         let touches = contact.depth >= -thick * elements.scale();
         let least = if touches { -thick } else { -elements.margin.max(thick) };
