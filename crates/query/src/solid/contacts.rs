@@ -519,14 +519,8 @@ mod tests {
             };
             let taken: Vec<Met> = out.iter().map(own).collect();
             let free = Free { elements: &elements, near: &near };
-            for (n, met) in taken.iter().enumerate() {
-                let apart = taken[..n].iter().map(|it| (it.place.point - met.place.point).norm());
-                let least = f64::from(SPREAD * elements.arrays.radii[met.i]) * (1.0 - 1e-9);
-                assert!(
-                    n == 0 || apart.fold(f64::MAX, f64::min) >= least,
-                    "{name}, round {round}: {met:?} is too near another contact"
-                );
-            }
+            let close = too_close(&elements, &taken);
+            assert!(close.is_none(), "{name}, round {round}: {close:?} is too near another contact");
             if taken.len() < MOST {
                 let left = free.next(&taken);
                 assert!(left.is_none(), "{name}, round {round}: room for {left:?}");
@@ -539,6 +533,15 @@ mod tests {
         let [rounds, one_by_one] = [0, 1].map(|k| spread.iter().map(|gaps| gaps[k]).sum::<f64>());
         assert!(rounds <= 1.02 * one_by_one, "{name}: gaps of {rounds}, one by one {one_by_one}");
         full
+    }
+
+    /// A contact that is not apart from one before, if there is one.
+    fn too_close(elements: &Elements<'_>, taken: &[Met]) -> Option<Met> {
+        let is_close = |&n: &usize| {
+            let least = f64::from(SPREAD * elements.arrays.radii[taken[n].i]) * (1.0 - 1e-9);
+            taken[..n].iter().any(|it| (it.place.point - taken[n].place.point).norm() < least)
+        };
+        (0..taken.len()).find(is_close).map(|n| taken[n])
     }
 
     /// Places among which contacts are selected.
