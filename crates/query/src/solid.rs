@@ -37,6 +37,7 @@ pub(crate) mod ray_lanes;
 pub(crate) mod reach;
 pub(crate) mod refine;
 pub(crate) mod scratch;
+pub(crate) mod selection;
 pub(crate) mod shape;
 pub(crate) mod sides;
 pub(crate) mod touch;

@@ -227,7 +227,7 @@ impl CandidateBlocks {
         self.blocks[n as usize / WIDTH].missed |= 1 << (n as usize % WIDTH);
     }
 
-    fn remove(&mut self, Candidate(n): Candidate) {
+    pub(crate) fn remove(&mut self, Candidate(n): Candidate) {
         self.blocks[n as usize / WIDTH].lanes &= !(1 << (n as usize % WIDTH));
     }
 
