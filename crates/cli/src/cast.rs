@@ -139,7 +139,9 @@ struct ImageReport {
 
 /// Parses a place in the world.
 fn parse_place(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let between = if text.contains(',') { ',' } else { ' ' };
+    let parts = text.split(between).map(str::trim).filter(|part| between == ',' || !part.is_empty());
+    let numbers: Option<Vec<f64>> = parts.map(|part| part.parse().ok()).collect();
     let place = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
     let place = place.filter(|place| place.iter().all(|c| c.is_finite()));
     place.ok_or_else(|| "expected X,Y,Z in world units, such as 1.5,0,2".into())

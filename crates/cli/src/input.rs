@@ -243,6 +243,10 @@ pub(crate) fn check_raw(path: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
+/// The remedy if the vertices of a mesh are too far apart.
+const INSTEAD: &str = "put points on the faces with `sample`, or compare the triangles: `collide`, `distance` and \
+                       `sweep` take --as-mesh a, b or both";
+
 /// Prepares a model, and warns if its points represent the input badly.
 pub(crate) fn build(
     path: &Path,
@@ -263,7 +267,7 @@ pub(crate) fn build(
     if model.mesh.is_some() && radius > COARSE * diagonal {
         console::warn(format_args!(
             "{}: the vertices of this mesh are about {} apart, but the mesh is only {} long; only vertices become \
-             points, so answers are as coarse as that; put points on the faces with `sample`",
+             points, so answers are as coarse as that; {INSTEAD}",
             path.display(),
             short(radius),
             short(diagonal),
@@ -271,7 +275,7 @@ pub(crate) fn build(
     } else if share > LONG_SHARE {
         console::warn(format_args!(
             "{}: {:.0} % of the mesh's surface is in faces with edges longer than {LONG} sampling radii ({}), and the \
-             scan has holes there because only vertices become points; put points on the faces with `sample`",
+             scan has holes there because only vertices become points; {INSTEAD}",
             path.display(),
             100.0 * share,
             short(LONG * radius),
@@ -329,12 +333,23 @@ impl std::fmt::Debug for TextLines {
     }
 }
 
+/// Returns `true` if a text is an object or numbers, as on the lines of files of shapes, rays and poses.
+fn is_content(text: &str) -> bool {
+    let are_numbers = || text.split([' ', ',']).all(|part| part.is_empty() || part.parse::<f64>().is_ok());
+    text.trim_start().starts_with(['{', '[']) || text.contains([' ', ',']) && are_numbers()
+}
+
 impl TextLines {
     /// Opens a file, or standard input for `-`.
     pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
         let (path, length, source): (_, _, Box<dyn Read + Send + Sync>) = if path == Path::new("-") {
             ("standard input".into(), None, Box::new(std::io::stdin()))
         } else {
+            if !path.exists() && path.to_str().is_some_and(is_content) {
+                let what = "expected the name of a file, got its content; write it to a file, or pass it to standard \
+                            input and name it `-`";
+                return Err(CliError::UnsuitableFile { path: path.to_owned(), what: what.into() });
+            }
             check_there(path)?;
             if path.is_dir() {
                 let what = "expected a text file, got a folder; name a file, or `-` for standard input";

@@ -69,7 +69,13 @@ impl JsonLines {
 /// Returns the fault in a line of JSON, after its column if that is known.
 pub(crate) fn json_fault(cause: &serde_json::Error) -> String {
     let message = cause.to_string();
-    let what =
-        message.split(" at line ").next().unwrap_or_default().replace("expected f64", "expected a number");
+    let what = message.split(" at line ").next().unwrap_or_default();
+    let what = what.replace("expected f64", "expected a number");
+    // The parser does not tell what it met.
+    let what = if what == "expected value" {
+        "expected a value, such as 0.5 (not .5 or +0.5), -2, \"name\" or [1,2,3]".to_owned()
+    } else {
+        what
+    };
     if cause.column() > 0 { format!("column {}: {what}", cause.column()) } else { what }
 }

@@ -232,7 +232,7 @@ impl<'a> Target<'a> {
     ) -> ShapeSweep {
         if !self.is_proper {
             let verdict = ShapeSweepVerdict::Undecided { t_free: 0.0, reason: SweepReason::Pose };
-            return ShapeSweep { verdict, distances: 0 };
+            return ShapeSweep { verdict, band: f64::INFINITY, distances: 0 };
         }
         let (level, Scratch { contact, solid, .. }) = (scratch.level(), scratch);
         let working = (level, &mut contact.gathers[0], &mut solid.candidates, &mut solid.contacts);

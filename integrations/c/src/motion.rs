@@ -44,8 +44,7 @@ pub struct SweepAnswer {
     pub upper: f64,
     /// The time at which they come nearest, as far as known.
     pub nearest_at: f64,
-    /// The length within which nothing is claimed about the scanned things themselves; for a shape the
-    /// sampling radius of the scan.
+    /// The length within which nothing is claimed about the scanned things themselves.
     pub band: f64,
 }
 
@@ -62,8 +61,8 @@ impl SweepAnswer {
         }
     }
 
-    fn of_shape(answer: &nearmiss::ShapeSweep, duration: f64, band: f64) -> Self {
-        let none = Self::undecided(band);
+    fn of_shape(answer: &nearmiss::ShapeSweep, duration: f64) -> Self {
+        let none = Self::undecided(answer.band);
         match answer.verdict {
             ShapeSweepVerdict::Free { clearance, upper, at } => none.free([duration, clearance, upper, at]),
             ShapeSweepVerdict::Impact { t_free, t_hit, contact } => {
@@ -185,6 +184,6 @@ pub unsafe extern "C" fn nearmiss_shape_sweep(
         // SAFETY: the caller promises the points of the shape.
         let shape = unsafe { required(shape, "shape")?.checked() }?;
         let answer = target.sweep(&shape, way, &mut get_mut(scratch, "scratch")?.scratch);
-        write(out, SweepAnswer::of_shape(&answer, way.duration(), target.scan().sampling_radius()))
+        write(out, SweepAnswer::of_shape(&answer, way.duration()))
     })
 }

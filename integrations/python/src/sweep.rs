@@ -112,9 +112,9 @@ impl SweepRecord {
         }
     }
 
-    /// The record of a shape, with the sampling radius of the scan as its band.
-    pub(crate) fn of_shape(answer: &nearmiss::ShapeSweep, duration: f64, band: f64) -> Self {
-        let none = Self::undecided(band);
+    /// The record of a shape.
+    pub(crate) fn of_shape(answer: &nearmiss::ShapeSweep, duration: f64) -> Self {
+        let none = Self::undecided(answer.band);
         match answer.verdict {
             ShapeSweepVerdict::Free { clearance, upper, at } => none.free([duration, clearance, upper, at]),
             ShapeSweepVerdict::Impact { t_free, t_hit, contact } => {

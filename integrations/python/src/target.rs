@@ -278,9 +278,8 @@ impl Target {
         let (py, convex, way) = (shape.py(), shape.get().convex(), motion(Some(path), Pose::from_matrix)?);
         let now = self.now(py)?;
         let options = Options::new(options, OF_BUDGET, now.frame.metric())?;
-        let band = now.target().scan().sampling_radius();
         let answer = ask(py, |scratch| now.target().sweep_within(&convex, &way, &options.budget(), scratch));
-        Ok(SweepAnswer(SweepRecord::of_shape(&answer, way.duration(), band)))
+        Ok(SweepAnswer(SweepRecord::of_shape(&answer, way.duration())))
     }
 
     /// Find the first place where a ray, or a ball of `radius` along it, hits the scan.

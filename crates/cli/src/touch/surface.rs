@@ -182,14 +182,20 @@ fn sentence(report: &SurfaceReport<'_>, margin: f64, unit: f64) -> String {
     let evidence = report.evidence.unwrap_or_default();
     match report.touches {
         Some(true) => {
-            let within =
-                if margin > 0.0 { format!("is within {} of it", short(margin)) } else { "touches it".into() };
+            let or_near =
+                if margin > 0.0 { format!(" or is within {} of it", short(margin)) } else { String::new() };
             let deepest = report.contacts.first().map_or_else(String::new, |contact| {
-                let what = if contact.depth >= 0.0 { "deep" } else { "away" };
+                let (which, what) =
+                    if contact.depth >= 0.0 { ("deepest", "deep") } else { ("nearest", "away") };
+                let which = match report.contacts.len() {
+                    1 => "1 contact,".to_owned(),
+                    more => format!("{more} contacts, the {which}"),
+                };
                 let (at, depth) = (place(contact.point, unit), rounded(contact.depth.abs(), unit));
-                format!(" {depth} {what} at {at}; the normal there is {}.", place(contact.normal, 1e-4))
+                let normal = place(contact.normal, 1e-4);
+                format!(" {which} {depth} {what} at {at}; the normal there is {normal}.")
             });
-            format!("The shape {within} ({evidence}).{deepest}")
+            format!("The shape touches it{or_near} ({evidence}).{deepest}")
         }
         Some(false) => {
             let apart = match (report.lower, report.upper) {

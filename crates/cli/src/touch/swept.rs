@@ -9,7 +9,7 @@ use nearmiss::{
 use serde::Serialize;
 
 use crate::console::{Results, micros_since, now};
-use crate::digits::{count, place, rounded_down, rounded_up, short};
+use crate::digits::{count, place, rough, rounded_down, rounded_up, short};
 use crate::error::CliError;
 use crate::evidence::word;
 use crate::label::Label;
@@ -37,6 +37,8 @@ struct SweptReport {
     clearance_at: Option<f64>,
     clearance_upper: Option<f64>,
     reason: Option<&'static str>,
+    /// The local spacing where the shape was nearest.
+    band: Option<f64>,
     distances: u32,
     micros: f64,
 }
@@ -158,6 +160,7 @@ fn answer(
         clearance_at: None,
         clearance_upper: None,
         reason: None,
+        band: Some(answer.band).filter(|band| band.is_finite()),
         distances: answer.distances,
         micros,
     };
@@ -187,8 +190,8 @@ fn sentence(answer: &ShapeSweep, margin: f64, unit: f64) -> String {
         "hits the scan".into()
     };
     let free_to = |t: f64| match t > 0.0 {
-        true => format!("Proven free up to t = {}.", time_down(t)),
-        false => "Nothing before that is proven free.".to_owned(),
+        true => format!(" Proven free up to t = {}.", time_down(t)),
+        false => " Nothing before that is proven free.".to_owned(),
     };
     let told = match answer.verdict {
         ShapeSweepVerdict::Free { clearance, upper, at } => {
@@ -203,18 +206,21 @@ fn sentence(answer: &ShapeSweep, margin: f64, unit: f64) -> String {
             let (at, normal) = (place(contact.point, unit), place(contact.normal, 1e-4));
             let when =
                 if t_hit > 0.0 { format!("at t = {}", time(t_hit)) } else { "at the start".to_owned() };
-            let proven = if t_hit > 0.0 { format!(" {}", free_to(t_free)) } else { String::new() };
+            let proven = if t_hit > 0.0 { free_to(t_free) } else { String::new() };
             format!("The shape {verb} {when}, at {at}; the normal there is {normal}.{proven}")
         }
         ShapeSweepVerdict::Undecided { t_free, reason } => {
             let why = match reason {
-                SweepReason::Near => {
-                    format!("at t = {} the shape is nearer than can be proven apart", time_down(t_free))
-                }
+                SweepReason::Near => format!(
+                    "at t = {} the shape is nearer than can be proven apart, as the points there are {} apart",
+                    time_down(t_free),
+                    rough(answer.band)
+                ),
                 SweepReason::Budget => "the search reached its limit".to_owned(),
                 _ => "the scan proves no separation".to_owned(),
             };
-            format!("Cannot tell: {why}; no contact was found. {}", free_to(t_free))
+            let proven = if t_free > 0.0 { free_to(t_free) } else { String::new() };
+            format!("Cannot tell: {why}; no contact was found.{proven}")
         }
     };
     format!("{told} {}", count(u64::from(answer.distances), "distance query").replace("querys", "queries"))

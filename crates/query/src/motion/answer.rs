@@ -105,6 +105,9 @@ pub enum ShapeSweepVerdict {
 pub struct ShapeSweep {
     /// The verdict.
     pub verdict: ShapeSweepVerdict,
+    /// The local spacing where the shape was nearest to the scan, below which the scan does not determine
+    /// the truth, in world units. Infinite if the shape, a pose or the scan is invalid.
+    pub band: f64,
     /// The number of distance queries.
     pub distances: u32,
 }

@@ -54,6 +54,8 @@ struct Course<'s, 'a> {
     budget: &'s Budget,
     level: Level,
     scratch: &'s mut ViewScratch,
+    /// The band where the distance was least.
+    band: f64,
     distances: u32,
 }
 
@@ -67,12 +69,13 @@ pub(crate) fn sweep(
     let clearance = elements.margin * elements.scale();
     let Some(Aabb { min, max }) = shape.bounds() else {
         let verdict = ShapeSweepVerdict::Undecided { t_free: 0.0, reason: SweepReason::Shape };
-        return ShapeSweep { verdict, distances: 0 };
+        return ShapeSweep { verdict, band: f64::INFINITY, distances: 0 };
     };
     let (min, max) = (Vector::from(min), Vector::from(max));
     let ball = (0.5 * (min + max), 0.5 * (max - min).norm());
+    let (band, distances) = (f64::INFINITY, 0);
     let mut course =
-        Course { elements, shape, motion, ball, clearance, budget, level, scratch, distances: 0 };
+        Course { elements, shape, motion, ball, clearance, budget, level, scratch, band, distances };
     let verdict = match course.run() {
         Outcome::Told(verdict) => verdict,
         Outcome::Hit { t_free, apart, t_hit } => {
@@ -90,7 +93,7 @@ pub(crate) fn sweep(
             }
         }
     };
-    ShapeSweep { verdict, distances: course.distances }
+    ShapeSweep { verdict, band: course.band, distances: course.distances }
 }
 
 /// The contact at the nearest points of a shape that touches nothing but the rim of a disc from beside, as
@@ -179,11 +182,11 @@ impl<'s> Course<'s, '_> {
                 }
             };
             let left = found.lower - self.clearance;
+            if found.upper < least {
+                (least, at, self.band) = (found.upper, time, found.band);
+            }
             if found.upper <= self.clearance {
                 return Outcome::Hit { t_free: proven.min(time), apart, t_hit: time };
-            }
-            if found.upper < least {
-                (least, at) = (found.upper, time);
             }
             kept = kept.min(last.map_or(found.lower, |(lower, way)| 0.5 * (lower + found.lower - way)));
             // Each leg takes one unit of time.
