@@ -5,6 +5,7 @@
 //!
 //! [`Probe`]: probe::Probe
 
+mod across;
 pub(crate) mod answer;
 pub(crate) mod apart;
 pub(crate) mod cover;

@@ -64,23 +64,44 @@ fn odd_rays(
     if (0..3).any(is_beyond) || !place.iter().all(|x| x.is_finite()) {
         return (0, few);
     }
-    // Balls of noisy points, and discs near them, are part of one surface.
-    let layer = f64::from(elements.arrays.sampling_radius) * elements.scale();
     let mut odd = 0;
     for (n, direction) in RAYS.iter().enumerate() {
         let direction = Vector::from(*direction).normalize();
         let ray = StoredRay { origin: *place, direction, max: f64::INFINITY, radius: 0.0 };
-        let (mut crossings, mut last) = (0_u32, f64::NEG_INFINITY);
-        all_hits(elements, &ray, (level, &mut *found, &mut *scratch), |hit| {
-            crossings += u32::from(hit.t - last > layer);
-            last = hit.t;
-        });
-        odd += usize::from(crossings % 2 == 1);
+        odd += usize::from(is_odd(elements, &ray, (level, &mut *found, &mut *scratch)));
         if n + 1 == few && (odd == 0 || odd == few) {
             return (odd, few);
         }
     }
     (odd, RAYS.len())
+}
+
+/// Returns `true` if a ray crosses the surface an odd number of times.
+fn is_odd(elements: &Elements<'_>, ray: &StoredRay, working: Working<'_>) -> bool {
+    // Balls of noisy points, and discs near them, are part of one surface.
+    let layer = f64::from(elements.arrays.sampling_radius) * elements.scale();
+    let (mut crossings, mut last) = (0_u32, f64::NEG_INFINITY);
+    all_hits(elements, ray, working, |hit| {
+        crossings += u32::from(hit.t - last > layer);
+        last = hit.t;
+    });
+    crossings % 2 == 1
+}
+
+/// Returns `true` if the way between two places of the stored frame surely crosses the surface an odd number
+/// of times: the ways in both directions tell so.
+pub(crate) fn crosses(
+    elements: &Elements<'_>,
+    places: [&Vector; 2],
+    (level, found, scratch): Working<'_>,
+) -> bool {
+    [[0, 1], [1, 0]].into_iter().all(|[from, to]| {
+        let way = places[to] - places[from];
+        let max = way.norm();
+        let Some(direction) = way.try_normalize(0.0) else { return false };
+        let ray = StoredRay { origin: *places[from], direction, max, radius: 0.0 };
+        is_odd(elements, &ray, (level, &mut *found, &mut *scratch))
+    })
 }
 
 /// Returns `true` if the inside counts.

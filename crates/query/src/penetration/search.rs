@@ -39,9 +39,10 @@ pub(crate) fn search<P: Probe>(
         ControlFlow::Continue(false) => search.narrow(),
         ControlFlow::Break(()) => ControlFlow::Break(()),
     };
-    let Search { best, mut lower, contacts, .. } = search;
-    // A deep place contradicts the shift: it is outside one of the things.
-    if lower > best.length * (1.0 + FINE) {
+    let Search { probe, best, mut lower, contacts, .. } = search;
+    // A deep place contradicts the shift by more than holes between discs explain: it is outside one of the
+    // things.
+    if lower > best.length * (1.0 + FINE) + probe.slack() {
         lower = contacts.least;
     }
     Bounds { lower: lower.min(best.length), shift: best.vector(), complete: flow.is_continue() }
@@ -120,6 +121,7 @@ impl<P: Probe> Search<'_, P> {
         self.lower = self.lower.max(self.contacts.least - self.probe.rounding());
         self.leave_contacts()?;
         self.try_directions()?;
+        self.look_across()?;
         self.raise()?;
         for _ in 0..ROUNDS {
             let before = self.best.length;
@@ -132,6 +134,7 @@ impl<P: Probe> Search<'_, P> {
         self.bisect(FINE)?;
         self.settle()?;
         self.lengthen()?;
+        self.look_across()?;
         self.raise()?;
         let enough = ENOUGH * self.enough();
         let Some(deepest) = self.deepest.filter(|_| self.lower < enough) else {
@@ -283,6 +286,15 @@ impl<P: Probe> Search<'_, P> {
             if self.best.length >= before {
                 angle *= 0.5;
             }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Raises the lower bound, from places on both sides of a surface.
+    fn look_across(&mut self) -> ControlFlow<()> {
+        if self.lower < ENOUGH * self.enough() {
+            let across = self.probe.across(self.best.way, self.contacts)?;
+            self.lower = self.lower.max(across - self.probe.rounding());
         }
         ControlFlow::Continue(())
     }

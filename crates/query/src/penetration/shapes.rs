@@ -7,6 +7,7 @@ use fearless_simd::Level;
 use crate::ask::answer::{Evidence, Statistics};
 use crate::ask::budget::Budget;
 use crate::pair::placed::ViewScratch;
+use crate::penetration::across::across;
 use crate::penetration::answer::{Interior, Penetration};
 use crate::penetration::apart::out_of_balls;
 use crate::penetration::interior::{counts, depth_in, is_inside, nearest_part};
@@ -157,6 +158,15 @@ impl Probe for ShapeProbe<'_, '_> {
             Where::OnA => self.deep_on_scan(solid, place),
             Where::Inside | Where::OnB => self.deep_in_scan(solid, place),
         })
+    }
+
+    fn across(&mut self, way: Vector, contacts: &ContactSurvey) -> ControlFlow<(), f64> {
+        self.go_on()?;
+        let normals = contacts.some.iter().map(|contact| contact.normals[0]);
+        let ways = [way].into_iter().chain(self.solid.axes).chain(normals).flat_map(|way| [way, -way]);
+        let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
+        let found = across(self.elements, self.solid, ways, working, &mut self.spent.evaluations);
+        ControlFlow::Continue(if found > 0.0 { found + self.elements.margin } else { 0.0 })
     }
 
     fn centres(&self) -> [Vector; 2] {

@@ -378,3 +378,54 @@ fn shallow_shapes_in_a_floor() {
     println!("lower at least {worst:.2?} of upper");
     assert!(worst.iter().all(|&share| share >= 0.6), "{worst:?}");
 }
+
+/// A plate that stands in a floor is nowhere deep, but has to leave as far as its top or its foot is away.
+#[test]
+fn plates_that_stand_in_a_floor() {
+    let rng = &mut rng(8804);
+    for noise in [0.0, 0.1] {
+        let floor = prepare(patch(4.0, 4.0), noise);
+        let r = floor.sampling_radius();
+        let plan = ShapePlan::new(&CollideOptions::default(), &floor).unwrap();
+        let target = Target::new(Placed::new(&floor, &Pose::IDENTITY), &plan);
+        let scratch = &mut Scratch::default();
+        // The share of the depth that is the lower bound, in the middle of the floor and beside its border.
+        let mut shares = [const { Vec::new() }; 2];
+        for round in 0..80_usize {
+            let is_beside = round % 4 == 3;
+            let x = if is_beside { rng.random_range(1.7..2.0) } else { rng.random_range(-1.0..1.0) };
+            let place = [x, rng.random_range(-0.5..0.5), rng.random_range(-0.25..0.25)];
+            let pose = rotation(rng).with_translation(place);
+            let corners: Vec<[f64; 3]> = (0..40_u8)
+                .map(|n| {
+                    let (sin, cos) = (0.4 * f64::from(n % 20)).sin_cos();
+                    pose.apply([0.4 * cos, 0.4 * sin, [-0.02, 0.02][usize::from(n / 20)]])
+                })
+                .collect();
+            let shape = match round % 3 {
+                0 => Shape::Box { pose, half: [0.4, 0.3, 0.02], radius: 0.0 },
+                1 => Shape::Box { pose, half: [0.3, 0.01, 0.4], radius: 0.01 },
+                _ => Shape::Hull { points: &corners, radius: 0.0 },
+            };
+            let bounds = shape.bounds().unwrap();
+            let exact = bounds.max[2].min(-bounds.min[2]);
+            if exact < 3.0 * r {
+                continue;
+            }
+            let found = target.penetration(&shape, HOLLOW, &Budget::UNLIMITED, scratch);
+            assert!(found.complete && found.lower <= exact + 0.3 * r, "{shape:?}: {exact} {found:?}");
+            for _ in 0..100 {
+                let t = Vector::from(unit_vector(rng)) * (found.lower * rng.random_range(0.0..0.999));
+                let moved = Placed::new(&floor, &Pose::from_translation((-t).into()));
+                let touches = Target::new(moved, &plan).touch(&shape, scratch).verdict.is_touching();
+                assert!(touches, "{shape:?}: {t} of {found:?} parts them");
+            }
+            if round % 3 < 2 {
+                shares[usize::from(is_beside)].push(found.lower / found.upper);
+            }
+        }
+        let least = shares.each_ref().map(|shares| shares.iter().copied().fold(1.0, f64::min));
+        println!("noise {noise}: lower at least {least:.2?} of upper, for {:?}", shares.map(|all| all.len()));
+        assert!(least[0] >= 0.5 && least[1] > 0.0, "noise {noise}: {least:?}");
+    }
+}
