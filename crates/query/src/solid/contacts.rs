@@ -64,7 +64,7 @@ pub(crate) fn contacts(
         for &(i, place) in ends.settle(elements, solid, level, (found, scratch)) {
             selected.places.push(Met { place, i, is_past_end: true });
         }
-        let mut selection = Selection::new((elements, solid, level), found, selected);
+        let mut selection = Selection::new((elements, solid, &sides), level, found, selected);
         selection.run(hint.as_deref());
         for (n, met) in selection.taken().enumerate() {
             (points[n], bands[n], at_ends[n]) = (met.i, elements.band(met.i), met.is_past_end);
@@ -104,22 +104,26 @@ mod tests {
     use crate::leaf::disc_triangle::FlatDisc;
     use crate::pair::placed::Placed;
     use crate::solid::gather::SPREAD;
-    use crate::solid::place::place_at;
+    use crate::solid::place::{from_behind, place_at};
     use crate::solid::plan::ShapePlan;
     use crate::solid::selection::LEVEL;
     use crate::solid::shape::Shape;
 
-    /// The places of all discs and balls, before and behind the surface.
-    fn all_places(elements: &Elements<'_>, solid: &Solid<'_>) -> [Vec<Met>; 2] {
+    /// The places of all discs and balls, before and behind the surface, and those at discs that the shape is
+    /// behind of.
+    fn all_places(elements: &Elements<'_>, solid: &Solid<'_>) -> [Vec<Met>; 3] {
         let sides = Sides::new(elements, solid.inside, None);
-        let mut all = [Vec::new(), Vec::new()];
+        let mut all = [Vec::new(), Vec::new(), Vec::new()];
         for i in 0..elements.placed.scan().len() {
             let (normal, radius) = (elements.normal(i), f64::from(elements.arrays.discs.get(i)));
             let disc = FlatDisc { centre: elements.position(i), normal, radius };
             let (sign, is_behind) =
                 if elements.is_disc(i) { sides.of(&disc, elements.band(i)) } else { (1.0, false) };
-            if let Some(place) = place_at(elements, solid, i, sign) {
-                all[usize::from(is_behind)].push(Met { place, i, is_past_end: false });
+            let Some(place) = place_at(elements, solid, i, sign) else { continue };
+            let other = from_behind(elements, solid, (i, sign), &place);
+            let list = if other.is_some() { 2 } else { usize::from(is_behind) };
+            if let Some(place) = other.unwrap_or(Some(place)) {
+                all[list].push(Met { place, i, is_past_end: false });
             }
         }
         all
@@ -174,10 +178,11 @@ mod tests {
             let (mut out, mut candidates) = (Vec::new(), Candidates::default());
             let working = (Level::new(), &mut ViewScratch::default(), &mut candidates);
             contacts(&elements, Some(&solid), None, &mut out, working);
-            let [mut front, mut behind] = all_places(&elements, &solid);
+            let [mut front, mut behind, mut turned] = all_places(&elements, &solid);
             for met in candidates.selected.places.iter().filter(|met| met.is_past_end) {
                 front.retain(|other| other.i != met.i);
                 behind.retain(|other| other.i != met.i);
+                turned.retain(|other| other.i != met.i);
                 front.push(*met);
                 past += 1;
             }
@@ -192,13 +197,17 @@ mod tests {
                 assert!(out.len() <= all.len().max(1), "{name}, round {round}: {out:?}");
                 continue;
             }
-            let deepest = near.iter().max_by(|a, b| a.deeper(b)).unwrap();
+            let deepest = near.iter().chain(&turned).max_by(|a, b| a.deeper(b)).unwrap();
             let band = all
                 .iter()
+                .chain(&turned)
                 .find(|met| met.contact(&elements).id == out[0].id)
                 .map_or(0.0, |met| elements.band(met.i));
             let least = deepest.contact(&elements).depth - LEVEL * band;
             assert!(out[0].depth >= least, "{name}, round {round}: {:?}, deepest {deepest:?}", out[0]);
+            // Only the first contact is at a disc that the shape is behind of.
+            let is_turned = turned.iter().any(|met| met.contact(&elements) == out[0]);
+            let all = if is_turned { [turned.clone(), all].concat() } else { all };
             let ids: Vec<u64> = all.iter().map(|met| met.contact(&elements).id).collect();
             let own = |contact: &ShapeContact| {
                 let n = ids.iter().position(|&id| id == contact.id);

@@ -11,7 +11,7 @@ use crate::pair::placed::ViewScratch;
 use crate::solid::candidates::{Candidate, CandidateBlocks, Slab, single};
 use crate::solid::core::Solid;
 use crate::solid::elements::{Element, Elements};
-use crate::solid::place::{PRECISION, Place, disc_gap, place_at};
+use crate::solid::place::{PRECISION, Place, disc_gap, from_behind, place_at};
 use crate::solid::touch::touch;
 
 type Vector = Vector3<f64>;
@@ -364,8 +364,14 @@ impl Sheet<'_> {
         let is_behind = |near: &Near| found.is_behind(near.candidate);
         let has_front = self.discs.iter().any(|near| !is_behind(near));
         self.discs.iter().filter(|near| !has_front || !is_behind(near)).any(|near| {
-            let most = || place_at(self.elements, self.solid, near.i, found.sign(near.candidate));
-            found.most(near.candidate) > than && most().is_some_and(|place| place.depth > than)
+            let own = (near.i, found.sign(near.candidate));
+            let place = || {
+                let place = place_at(self.elements, self.solid, own.0, own.1)?;
+                let is_open = !self.elements.placed.scan().is_oriented();
+                let other = is_open.then(|| from_behind(self.elements, self.solid, own, &place)).flatten();
+                other.unwrap_or(Some(place))
+            };
+            found.most(near.candidate) > than && place().is_some_and(|place| place.depth > than)
         })
     }
 

@@ -62,6 +62,47 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
     place.filter(|it| it.depth >= solid.radius - most)
 }
 
+/// A shape moves out of a disc to the other side if it reaches so many times as far behind the disc as before it.
+const BEYOND: f64 = 4.0;
+
+/// A place that is less deep is not wrong by much, in local radii.
+const SHALLOW: f64 = 0.05;
+
+/// Checks on which side of point `i` a shape moves out that has this place there. A shape may be almost or all
+/// behind a disc although its centre is before the plane of the disc, as the foot of a long body is behind the
+/// steps of stairs that it has passed. Returns the place on the other side then, and `None` within if there is
+/// none. A place that is less deep than the local radius stays if the shape touches the disc.
+pub(crate) fn from_behind(
+    elements: &Elements<'_>,
+    solid: &Solid<'_>,
+    (i, sign): (usize, f64),
+    place: &Place,
+) -> Option<Option<Place>> {
+    let band = f64::from(elements.arrays.radii[i]);
+    let (depth, is_deep) = (place.depth, place.depth > band);
+    let is_told = if elements.margin > 0.0 { depth > SHALLOW * band } else { is_deep };
+    let least = if is_deep { depth / BEYOND } else { 0.0 };
+    if !is_told || !elements.is_disc(i) || before(solid, place) >= least {
+        return None;
+    }
+    let other = place_at(elements, solid, i, -sign);
+    other.is_none_or(|other| other.depth < least).then_some(other)
+}
+
+/// A lower bound on how far a shape reaches before the disc, where it is deepest behind it.
+fn before(solid: &Solid<'_>, place: &Place) -> f64 {
+    if !solid.is_box() || solid.radius > 0.0 {
+        return solid.radius - solid.distance_bound(&place.point);
+    }
+    // Along the line through both places, up to the face where it leaves the box.
+    let from = place.point - solid.centre;
+    let leaves = |k: usize| {
+        let [at, rise] = [from, place.normal].map(|v| solid.axes[k].dot(&v));
+        if rise.abs() > 1e-9 { (solid.half[k] - at * rise.signum()) / rise.abs() } else { f64::INFINITY }
+    };
+    (0..3).map(leaves).fold(f64::INFINITY, f64::min)
+}
+
 /// An upper bound on the depth over the disc of point `i`, whose normal in the direction in which the shape
 /// moves out has this sign: the depth of the lowest point of the shape. Infinite for shapes of which bounds
 /// from their boxes are as good, and for balls.

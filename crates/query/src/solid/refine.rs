@@ -67,8 +67,10 @@ pub(crate) fn refine(
         let thick = f64::from(THICKNESS) * radius;
         let touches = contact.depth >= -thick * elements.scale();
         let least = if touches { -thick } else { -elements.margin.max(thick) };
-        if let Some(Place { normal, depth, .. }) =
-            deepest(FlatDisc { radius: PLACE * radius, ..disc }).filter(|found| found.depth >= least)
+        // The shape may be behind this place, and beside the disc.
+        let most = (contact.depth + band) / elements.scale();
+        if let Some(Place { normal, depth, .. }) = deepest(FlatDisc { radius: PLACE * radius, ..disc })
+            .filter(|found| (least..=most).contains(&found.depth))
         {
             contact.point = foot.into();
             contact.depth = depth * elements.scale();

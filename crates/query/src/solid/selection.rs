@@ -18,8 +18,9 @@ use crate::solid::core::Solid;
 use crate::solid::elements::Elements;
 use crate::solid::gather::SPREAD;
 use crate::solid::hint::{MOST, ShapeHint};
-use crate::solid::place::{Place, most_depth, place_at, place_beside};
+use crate::solid::place::{Place, from_behind, most_depth, place_at, place_beside};
 use crate::solid::places::{LANES, places_at};
+use crate::solid::sides::Sides;
 
 /// Another contact may be this much deeper than the first, in local radii.
 pub(crate) const LEVEL: f64 = 0.01;
@@ -59,6 +60,7 @@ pub(crate) struct Selected {
 pub(crate) struct Selection<'s, 'a> {
     elements: &'s Elements<'a>,
     solid: &'s Solid<'s>,
+    sides: &'s Sides,
     level: Level,
     found: &'s mut CandidateBlocks,
     scratch: &'s mut Selected,
@@ -71,11 +73,12 @@ pub(crate) struct Selection<'s, 'a> {
 
 impl<'s, 'a> Selection<'s, 'a> {
     pub(crate) fn new(
-        (elements, solid, level): (&'s Elements<'a>, &'s Solid<'s>, Level),
+        (elements, solid, sides): (&'s Elements<'a>, &'s Solid<'s>, &'s Sides),
+        level: Level,
         found: &'s mut CandidateBlocks,
         scratch: &'s mut Selected,
     ) -> Self {
-        Self { elements, solid, level, found, scratch, tries: 0, taken: [0; MOST], count: 0 }
+        Self { elements, solid, sides, level, found, scratch, tries: 0, taken: [0; MOST], count: 0 }
     }
 
     /// Selects the contacts.
@@ -146,15 +149,25 @@ impl<'s, 'a> Selection<'s, 'a> {
         });
     }
 
-    /// Keeps the place of a candidate, and returns its number. Removes the candidate if it has none.
+    /// Keeps the place of a candidate, and returns its number. Removes the candidate if it has none, or if the
+    /// shape is behind its disc.
     fn keep(&mut self, candidate: Candidate, place: Option<Place>) -> Option<usize> {
-        let Some(place) = place else {
+        let (i, sign) = (self.found.point(candidate), self.found.sign(candidate));
+        let other = place
+            .filter(|_| self.sides.are_open(self.elements, i))
+            .and_then(|place| from_behind(self.elements, self.solid, (i, sign), &place));
+        let Some(place) = other.unwrap_or(place) else {
             self.found.miss(candidate);
             return None;
         };
         let number = self.scratch.places.len();
-        self.scratch.places.push(Met { place, i: self.found.point(candidate), is_past_end: false });
-        self.found.set_place(candidate, number);
+        self.scratch.places.push(Met { place, i, is_past_end: false });
+        if other.is_some() {
+            // Beside contacts that push the other way it would hold the shape.
+            self.found.remove(candidate);
+        } else {
+            self.found.set_place(candidate, number);
+        }
         Some(number)
     }
 

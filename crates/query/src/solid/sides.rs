@@ -3,7 +3,7 @@
 use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::leaf::disc_triangle::FlatDisc;
-use crate::solid::elements::Elements;
+use crate::solid::elements::{Element, Elements};
 use crate::solid::hint::{MOST, ShapeHint};
 
 type Vector = Vector3<f64>;
@@ -47,6 +47,19 @@ impl Sides {
     /// Returns `true` if contacts of the last frame decide about discs near them.
     pub(crate) fn has_contacts(&self) -> bool {
         !self.is_oriented && self.count > 0
+    }
+
+    /// Returns `true` if neither the scan nor a contact of the last frame decides about point `i`.
+    pub(crate) fn are_open(&self, elements: &Elements<'_>, i: usize) -> bool {
+        if self.is_oriented {
+            return false;
+        }
+        let disc = || match elements.element(i) {
+            Element::Disc(disc) => Some(disc),
+            Element::Ball(..) => None,
+        };
+        self.count == 0
+            || disc().is_none_or(|disc| self.known(&disc, f64::from(elements.arrays.radii[i])).is_none())
     }
 
     /// The sign of the normal of a disc in the direction in which the shape moves out, and `true` if the

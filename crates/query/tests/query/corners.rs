@@ -124,3 +124,88 @@ fn a_margin_does_not_lift_what_touches() {
     }
     assert!(touching > 4000 && differ > 1000, "{differ} of {touching} differ");
 }
+
+/// The treads and risers of ten steps along x, 0.28 long, 0.17 high and 1 wide.
+fn steps() -> Vec<[f64; 3]> {
+    let mut points = Vec::new();
+    for step in 0..10_u8 {
+        let [x, z] = [0.28, 0.17].map(|size| size * f64::from(step));
+        rectangle([x, 0.0, z], [[0.28, 0.0, 0.0], [0.0, 1.0, 0.0]], &mut points);
+        rectangle([x, 0.0, z - 0.17], [[0.0, 0.0, 0.17], [0.0, 1.0, 0.0]], &mut points);
+    }
+    points
+}
+
+/// A shape that touches nothing has only gaps within the margin, also where its centre is before the plane of
+/// a disc and the shape is behind the disc.
+#[test]
+fn what_is_apart_is_nowhere_deep() {
+    // A wall with a doorway, on a floor.
+    let mut door = Vec::new();
+    rectangle([0.0; 3], [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], &mut door);
+    for x in [0.0, 1.2] {
+        rectangle([x, 1.0, 0.0], [[0.8, 0.0, 0.0], [0.0, 0.0, 2.0]], &mut door);
+    }
+    for (name, points) in [("door", door), ("steps", steps())] {
+        let scan = built(&points);
+        let (r, rng, scratch) = (scan.sampling_radius(), &mut rng(92), &mut Scratch::default());
+        let margin = 0.5 * r;
+        let options = CollideOptions::default().with_margin(margin);
+        let plans = [CollideOptions::default(), options, options.with_detail(Detail::Verdict)]
+            .map(|options| ShapePlan::new(&options, &scan).unwrap());
+        let [bare, witness, verdict] =
+            plans.each_ref().map(|plan| Target::new(Placed::new(&scan, &Pose::IDENTITY), plan));
+        let (mut contacts, mut compared) = (Vec::new(), 0);
+        for round in 0..60_000 {
+            let radius = rng.random_range(2.0..6.0) * r;
+            let half = rng.random_range(1.0..15.0) * r;
+            let at = Vector::from(points[rng.random_range(0..points.len())]);
+            let centre =
+                (at + Vector::from(unit_vector(rng)) * rng.random_range(0.0..half + 2.0 * radius)).into();
+            let pose = rotation(rng).with_translation(centre);
+            let shape = match round % 3 {
+                0 => {
+                    let ends = [-half, half].map(|y| pose.apply([0.0, y, 0.0]));
+                    Shape::Capsule { ends, radius }
+                }
+                1 => Shape::Box { pose, half: [radius, half, 0.5 * radius], radius: 0.0 },
+                _ => Shape::Cylinder { pose, half_height: half, radius, rounding: 0.0 },
+            };
+            let found = bare.distance(&shape, margin, scratch);
+            let Some(found) = found.filter(|found| found.upper > 0.05 * r) else { continue };
+            for target in [&witness, &verdict] {
+                target.contacts(&shape, &mut contacts, scratch);
+                let deepest = contacts.first().unwrap_or_else(|| panic!("{name}: {shape:?} has no contact"));
+                assert!(deepest.depth < 0.1 * r, "{name}: {shape:?}, {} apart: {contacts:?}", found.upper);
+                compared += 1;
+            }
+        }
+        assert!(compared > 1000, "{compared} of {name}");
+    }
+}
+
+/// Upright capsules on steps, whose feet reach into a tread, perhaps over its edge: the riser below is no way
+/// out.
+#[test]
+fn feet_on_steps_leave_them_upwards() {
+    let scan = built(&steps());
+    let (r, rng, scratch) = (scan.sampling_radius(), &mut rng(93), &mut Scratch::default());
+    let mut contacts = Vec::new();
+    let mut most = 0.0_f64;
+    for round in 0..2000 {
+        let options = CollideOptions::default().with_margin([0.0, 0.3 * r][round % 2]);
+        let plan = ShapePlan::new(&options, &scan).unwrap();
+        let target = Target::new(Placed::new(&scan, &Pose::IDENTITY), &plan);
+        let (radius, depth) = (0.1, rng.random_range(0.0..0.3) * r);
+        let step = f64::from(rng.random_range(1..9_u8));
+        let x = 0.28 * step + rng.random_range(0.0..0.28 - radius - 0.02);
+        let foot = [x, rng.random_range(0.3..0.7), 0.17 * step + radius - depth];
+        let head = [foot[0] + rng.random_range(-0.1..0.1), foot[1], foot[2] + 1.2];
+        target.contacts(&Shape::Capsule { ends: [foot, head], radius }, &mut contacts, scratch);
+        for contact in &contacts {
+            assert!(contact.depth < depth + r, "{depth} in step {step}, {x}: {contact:?}");
+            most = most.max(contact.depth - depth);
+        }
+    }
+    println!("at most {:.2} r too deep", most / r);
+}
