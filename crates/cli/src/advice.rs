@@ -9,7 +9,7 @@ use crate::report::median;
 /// Least shares of the points for which advice is given.
 const MANY_ON_LINES: f64 = 0.1;
 const MANY_SPARSE: f64 = 0.05;
-const MANY_OUTLIERS: f64 = 0.001;
+const MANY_OUTLIERS: f64 = 0.0003;
 const MANY_NOISY: f64 = 0.2;
 const MANY_AT_BORDERS: f64 = 0.02;
 
@@ -117,14 +117,14 @@ fn of_holes(health: &Health) -> Option<String> {
     ))
 }
 
-/// Returns advice if there are outliers: isolated points near much denser ones.
+/// Returns advice if there are outliers: isolated points near much denser ones, or scattered in space.
 fn of_outliers(scan: &Scan, health: &Health) -> Option<String> {
     (health.outliers > MANY_OUTLIERS).then(|| {
         #[expect(clippy::cast_precision_loss, reason = "a count")]
         let count = (health.outliers * scan.len() as f64).round();
         format!(
-            "{} of the points (about {count}) are outliers near much denser points, and count as balls of radius up to \
-             {}; to remove them, use `preprocess --remove-outliers 8,2`",
+            "{} of the points (about {count}) are outliers: far from others, and in no surface with them. They count as \
+             balls of radius up to {}; to remove them, use `preprocess --remove-outliers 8,2`",
             part(health.outliers),
             rough(health.largest_ball)
         )

@@ -26,7 +26,7 @@ pub(crate) struct Health {
     pub(crate) largest_ball: f64,
     /// Estimated share of the points at borders of surfaces.
     pub(crate) border: f64,
-    /// Estimated share of the isolated points near much denser ones.
+    /// Estimated share of the isolated points, near much denser ones or scattered in space.
     pub(crate) outliers: f64,
     /// Points much sparser than the others, if there are enough to matter.
     pub(crate) uneven: Option<Uneven>,

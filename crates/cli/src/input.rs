@@ -284,9 +284,18 @@ pub(crate) fn build(
     Ok(scan)
 }
 
-/// Warns if rounding to single precision moves points by a relevant distance.
+/// Warns if rounding to single precision moves points by a relevant distance, or seems to have done so before
+/// they were written to the file.
 pub(crate) fn check_step(path: &Path, scan: &Scan) {
     let radius = scan.sampling_radius();
+    if let Some(step) = rounded_before(scan).filter(|step| *step > radius / 10.0) {
+        console::warn(format_args!(
+            "{}: the coordinates are multiples of {}, to which single precision rounds numbers of this size, so the \
+             points may be off by half of that; export the scan in double precision, or shift it to the origin before",
+            path.display(),
+            short(step)
+        ));
+    }
     if scan.step() > radius / 100.0 {
         console::warn(format_args!(
             "{}: single precision moves points by up to {}, more than a hundredth of the sampling radius \
@@ -296,6 +305,30 @@ pub(crate) fn check_step(path: &Path, scan: &Scan) {
             short(radius)
         ));
     }
+}
+
+/// The number of points whose coordinates are looked at.
+const LOOKED_AT: usize = 4096;
+
+/// The step to which single precision rounds the greatest coordinates of a scan, if almost all of them are
+/// multiples of it, and many odd ones. Coordinates of a coarser grid are even multiples.
+fn rounded_before(scan: &Scan) -> Option<f64> {
+    let (bounds, frame) = (scan.bounds(), scan.frame());
+    let steps = (0..3).filter_map(|k| {
+        let most = bounds.min[k].abs().max(bounds.max[k].abs());
+        let step = f64::from(f32::EPSILON) * most.log2().floor().exp2();
+        let count = scan.len().min(LOOKED_AT);
+        let (mut exact, mut odd) = (0, 0);
+        for n in 0..count {
+            let stored = f64::from(scan.positions()[n * scan.len() / count][k]);
+            let multiple = (frame.origin[k] + frame.scale * stored) / step;
+            let nearest = multiple.round();
+            exact += usize::from((multiple - nearest).abs() < 0.01);
+            odd += usize::from((nearest * 0.5).fract() != 0.0);
+        }
+        (odd > 0 && exact * 100 >= count * 99 && odd * 4 >= count).then_some(step)
+    });
+    steps.max_by(f64::total_cmp)
 }
 
 /// Returns the share of the area in faces with an edge longer than `long`; 0 without faces.
@@ -336,7 +369,10 @@ impl std::fmt::Debug for TextLines {
 /// Returns `true` if a text is an object or numbers, as on the lines of files of shapes, rays and poses.
 fn is_content(text: &str) -> bool {
     let are_numbers = || text.split([' ', ',']).all(|part| part.is_empty() || part.parse::<f64>().is_ok());
-    text.trim_start().starts_with(['{', '[']) || text.contains([' ', ',']) && are_numbers()
+    let text = text.trim();
+    let is_json =
+        [('{', '}'), ('[', ']')].iter().any(|&(open, close)| text.starts_with(open) && text.ends_with(close));
+    is_json || text.contains([' ', ',']) && are_numbers()
 }
 
 impl TextLines {

@@ -102,13 +102,22 @@ impl Pose {
     }
 
     /// Creates the rotation of a quaternion (x, y, z, w) of any length. Returns the identity for
-    /// length zero.
+    /// length zero. A component that is not finite gives a rotation of NaN, which every query refuses.
+    ///
+    /// ```
+    /// use nearmiss_geometry::Pose;
+    ///
+    /// assert!(Pose::from_quaternion([0.0, f64::NAN, 0.0, 1.0]).apply([1.0, 0.0, 0.0])[0].is_nan());
+    /// ```
     #[inline]
     #[must_use]
     pub fn from_quaternion(q: [f64; 4]) -> Self {
+        let is_finite = q.iter().all(|x| x.is_finite());
         let q = nalgebra::Quaternion::from(q);
         let unit = nalgebra::Unit::try_new(q, 0.0).unwrap_or_default();
-        Self { rotation: unit.to_rotation_matrix().into_inner(), ..Self::IDENTITY }
+        let rotation = unit.to_rotation_matrix().into_inner();
+        let rotation = if is_finite { rotation } else { Matrix3::repeat(f64::NAN) };
+        Self { rotation, ..Self::IDENTITY }
     }
 
     /// Creates the rotation of a quaternion (x, y, z, w), as [`Self::from_quaternion`] does,

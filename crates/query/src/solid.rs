@@ -40,4 +40,5 @@ pub(crate) mod scratch;
 pub(crate) mod selection;
 pub(crate) mod shape;
 pub(crate) mod sides;
+mod thickness;
 pub(crate) mod touch;

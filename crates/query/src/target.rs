@@ -122,7 +122,8 @@ impl<'a> Target<'a> {
     /// margin has contacts of negative depth.
     ///
     /// The normal of a disc points outwards if the scan is oriented, otherwise to the side of the
-    /// shape's centre. If the shape's centre is before some surfaces of an oriented scan and behind others,
+    /// shape's centre, or to the other side if the shape reaches four times as far behind the disc as
+    /// before it. If the shape's centre is before some surfaces of an oriented scan and behind others,
     /// as at a thin plate, contacts with those that it is behind are left out. With
     /// [`Detail::Witness`](crate::Detail) each contact is moved onto the surface by one evaluation of the
     /// implicit function.

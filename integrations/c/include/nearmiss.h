@@ -1082,8 +1082,7 @@ typedef struct NearmissSweepAnswer {
      */
     double nearest_at;
     /*
-     The length within which nothing is claimed about the scanned things themselves; for a shape the
-     sampling radius of the scan.
+     The length within which nothing is claimed about the scanned things themselves.
      */
     double band;
 } NearmissSweepAnswer;

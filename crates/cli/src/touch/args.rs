@@ -38,7 +38,7 @@ pub struct TouchArgs {
     /// Shapes are tested against the obstacle: tangent discs where points sample a sheet, small balls
     /// about all other points. Contact normals point outwards if the scan is oriented (`preprocess
     /// --graph`, or `--scanner` for a room, whose normals point inwards then), otherwise to the side on
-    /// which the shape's centre lies.
+    /// which the shape's centre lies, or to the other one where the shape is almost all behind.
     #[arg(long)]
     pub surface: bool,
     /// Test against balls of this radius about the points instead of the surface, with the same report

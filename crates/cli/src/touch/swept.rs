@@ -212,7 +212,7 @@ fn sentence(answer: &ShapeSweep, margin: f64, unit: f64) -> String {
         ShapeSweepVerdict::Undecided { t_free, reason } => {
             let why = match reason {
                 SweepReason::Near => format!(
-                    "at t = {} the shape is nearer than can be proven apart, as the points there are {} apart",
+                    "at t = {} the shape is nearer than can be proven apart; where it is nearest, points are {} apart",
                     time_down(t_free),
                     rough(answer.band)
                 ),

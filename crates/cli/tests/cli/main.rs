@@ -1,6 +1,7 @@
 //! Tests of the built command.
 #![cfg(test)]
 
+mod advice;
 mod animating;
 mod bad_input;
 mod building_maps;

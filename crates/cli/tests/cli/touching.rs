@@ -208,7 +208,10 @@ fn shapes_on_a_floor_have_contacts_with_the_surface() {
     let thick = ["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--thickened", "0.05", "--json"];
     assert!(place.ok(&thick).json().iter().all(|line| line["evidence"] == "certified"), "balls are exact");
     let people = place.ok(&asked[..5]).results;
-    assert!(people.contains("line 2: The shape touches it (certified). 0.0100 deep at "), "{people}");
+    assert!(
+        people.contains("line 2: The shape touches it (certified). 6 contacts, the deepest 0.0100 deep at "),
+        "{people}"
+    );
     place.refused(
         2,
         &["touch", "floor.xyz", "--shapes", "shapes.jsonl", "--margin", "1"],
@@ -238,7 +241,7 @@ fn shapes_along_a_path_hit_a_ball_or_are_proven_free() {
     };
     let told = asked("into.txt", &["--json"]).json();
     let expected = "verdict evidence t_free t_hit contact clearance clearance_at clearance_upper reason \
-                    distances micros";
+                    band distances micros";
     assert_eq!(keys(&told[1]), sorted(expected));
     assert_eq!(told[0]["name"], "head");
     // The reach of each shape along the path, at whose end the path is at -3.

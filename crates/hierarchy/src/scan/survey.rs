@@ -8,6 +8,7 @@ use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::chunks;
+use nearmiss_surface::symmetric_eigen;
 
 use crate::descent::PlaceVisitor;
 use crate::scan::build::PointHierarchy;
@@ -21,9 +22,16 @@ const BLOCKS: usize = 128;
 const RANK: usize = 6;
 
 /// A point is an outlier if its spacing exceeds the reach and at least this many of its six nearest
-/// neighbours are on sheets and [`DENSER`] times denser.
+/// neighbours are on sheets and [`DENSER`] times denser, or if it is in no plane or line with its neighbours.
 const OUTLIER: usize = 2;
 const DENSER: f64 = 4.0;
+
+/// The number of neighbours that show a plane.
+const PLANE: usize = 12;
+
+/// Points are in no plane if their least variance exceeds this share of the next one, and in no line if that
+/// exceeds the same share of the greatest. Twelve points at random in a ball have about a half.
+const FLAT: f64 = 0.1;
 
 /// The number of neighbours that show a border. Of 24 random directions in a plane, one in ten
 /// thousand leaves a sector of 150° empty.
@@ -53,8 +61,8 @@ pub struct SamplingSurvey {
     /// The distance of each sampled point except outliers to its sixth neighbour, ascending, and
     /// the share of all points that it represents.
     pub spacings: Vec<(f64, f64)>,
-    /// The estimated share of points that are on no sheet and have much denser points as
-    /// neighbours.
+    /// The estimated share of points that are on no sheet, and have much denser points as neighbours or are
+    /// in no plane and no line with them.
     pub outliers: f64,
     /// The estimated share of points at a border of a sheet.
     pub border: f64,
@@ -126,7 +134,7 @@ impl PointHierarchy {
                 // The radii of other points are limited by the reach.
                 let is_denser = |j: usize| j < arrays.dense && DENSER * f64::from(arrays.radii[j]) < spacing;
                 let denser = near.filter(|&j| is_denser(j));
-                denser.count() >= OUTLIER
+                denser.count() >= OUTLIER || self.is_scattered(i, ring.ids().take(PLANE))
             };
             if is_outlier {
                 seen.outliers += 1;
@@ -149,6 +157,22 @@ impl PointHierarchy {
 
     fn normal(&self, i: usize) -> Vector3<f64> {
         self.normals()[i].map(f64::from).into()
+    }
+
+    /// Returns `true` if a point is in no plane and in no line with its neighbours.
+    fn is_scattered(&self, i: usize, near: impl Iterator<Item = usize>) -> bool {
+        let (mut count, mut sum, mut products) = (0.0, Vector3::zeros(), [0.0; 6]);
+        for j in near.chain([i]) {
+            let d = self.place(j) - self.place(i);
+            (count, sum) = (count + 1.0, sum + d);
+            let own = [d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z];
+            products = [0, 1, 2, 3, 4, 5].map(|k| products[k] + own[k]);
+        }
+        let m: Vector3<f64> = sum / count;
+        let of_mean = [m.x * m.x, m.x * m.y, m.x * m.z, m.y * m.y, m.y * m.z, m.z * m.z];
+        let covariance = [0, 1, 2, 3, 4, 5].map(|k| products[k] / count - of_mean[k]);
+        let [least, next, most] = symmetric_eigen(covariance).values;
+        least > FLAT * next && next > FLAT * most
     }
 
     /// Returns the direction in the tangent plane of point `i` in which its sheet ends, if it ends

@@ -1,15 +1,16 @@
 //! A lower bound of the penetration of a shape that lies on both sides of a surface.
 //!
 //! A shift that is shorter than the distance of a place of the shape from the surface leaves the place on its
-//! side. If two places are on different sides, the shape crosses the surface until one of them arrives there,
-//! unless the surface ends where the shape is. So a thin plate that stands in a wall has a bound about as long
-//! as the way out, while every place in it is at most half its thickness deep.
+//! side. If two places are on different sides, the shape crosses the surface until one of them arrives
+//! there, unless the surface ends where the shape is. So a thin plate that stands in a wall has a bound about
+//! as long as the way out, while every place in it is at most half its thickness deep.
 
 use std::ops::ControlFlow;
 
 use fearless_simd::{Level, Simd};
 use nearmiss_geometry::Pose;
 
+use crate::ask::budget::Budget;
 use crate::ask::options::Semantics;
 use crate::pair::placed::ViewScratch;
 use crate::penetration::interior::{Working, crosses};
@@ -23,8 +24,8 @@ use crate::solid::shape::Shape;
 /// The number of places of the shape that are compared at most.
 pub(crate) const ENDS: usize = 24;
 
-/// Pairs of places whose surroundings are searched for borders at most.
-const PAIRS: usize = 16;
+/// Searches for borders at most.
+const BORDERS: usize = 16;
 
 /// A place of the shape.
 #[derive(Debug, Clone, Copy)]
@@ -36,17 +37,17 @@ struct End {
 
 /// Returns a length such that the shape crosses the surface after every shorter shift; 0 if none is found.
 /// The places that are compared are those of the shape that are furthest along some directions. Adds the
-/// questions about the scan to `asked`.
+/// questions about the scan to `asked`. Breaks if the budget is spent.
 pub(crate) fn across(
     elements: &Elements<'_>,
     solid: &Solid<'_>,
     ways: impl Iterator<Item = Vector>,
     (level, crossings, scratch): Working<'_>,
-    asked: &mut u64,
-) -> f64 {
+    (budget, asked): (&Budget, &mut u64),
+) -> ControlFlow<(), f64> {
     let width = solid.width();
     if elements.semantics != Semantics::Obstacle || width <= 0.0 {
-        return 0.0;
+        return ControlFlow::Continue(0.0);
     }
     let mut flat = elements.flat();
     flat.certifies = true;
@@ -54,10 +55,11 @@ pub(crate) fn across(
     let mut count = 0;
     for way in ways.filter_map(|way| way.try_normalize(1e-9)).take(ENDS) {
         let place = solid.support(&way) + way * solid.radius;
+        budget.go_on(*asked)?;
         *asked += 1;
         let Some(found) = nearest(&flat, &Solid::point(place), f64::INFINITY, (level, &mut scratch.corners))
         else {
-            return 0.0;
+            return ControlFlow::Continue(0.0);
         };
         // Towards the centre the shape becomes wider, until a hole is too small for it.
         let narrow = elements.hole(found.i) * (place - solid.inside).norm() / width;
@@ -69,23 +71,36 @@ pub(crate) fn across(
     }
     let ends = &mut ends[..count];
     ends.sort_by(|a, b| b.away.total_cmp(&a.away));
-    let (mut best, mut pairs) = (0.0_f64, 0);
+    let (mut best, mut borders) = (0.0_f64, 0);
+    // The places that are on the other side than the first.
+    let mut are_opposite = [false; ENDS];
     for n in 1..count {
-        for other in 0..n {
-            let (p, q) = (ends[other], ends[n]);
-            if q.away <= best || pairs == PAIRS {
-                return best;
+        let q = ends[n];
+        if q.away <= best {
+            break;
+        }
+        budget.go_on(*asked)?;
+        *asked += 1;
+        let is_crossed = |p: &End, working: Working<'_>| crosses(elements, [&p.place, &q.place], working);
+        are_opposite[n] = is_crossed(&ends[0], (level, &mut *crossings, &mut *scratch));
+        for other in 0..if are_opposite[n] { n } else { 0 } {
+            let p = ends[other];
+            if q.away <= best || borders == BORDERS {
+                break;
             }
-            *asked += 1;
-            if !crosses(elements, [&p.place, &q.place], (level, &mut *crossings, &mut *scratch)) {
+            if are_opposite[other] {
                 continue;
             }
-            pairs += 1;
+            budget.go_on(*asked)?;
+            (borders, *asked) = (borders + 1, *asked + 1);
+            if other > 0 && !is_crossed(&p, (level, &mut *crossings, &mut *scratch)) {
+                continue;
+            }
             let between = [p.place, solid.inside, q.place].map(Into::into);
             best = best.max(up_to_border(elements, between, (q.away, best), (level, &mut *scratch)));
         }
     }
-    best
+    ControlFlow::Continue(best)
 }
 
 /// The distance of a triangle from the nearest border of the surface, or `most` if that is less. May end the
@@ -99,7 +114,7 @@ fn up_to_border(
     let Some(solid) = Solid::new(&Shape::Triangle { points, radius: 0.0 }, &Pose::IDENTITY) else {
         return 0.0;
     };
-    let mut near = Near::new(elements, &solid, false, &mut scratch.corners);
+    let mut near = Near::new(elements, &solid, true, &mut scratch.corners);
     near.limit(most);
     let mut search = Border { near, within: most, least };
     let _is_near = near.search(level, most, &mut search);

@@ -88,8 +88,8 @@ fn is_odd(elements: &Elements<'_>, ray: &StoredRay, working: Working<'_>) -> boo
     crossings % 2 == 1
 }
 
-/// Returns `true` if the way between two places of the stored frame surely crosses the surface an odd number
-/// of times: the ways in both directions tell so.
+/// Returns `true` if the way between two places of the stored frame crosses the surface an odd number of
+/// times, in both directions. Two sheets closer than a sampling radius are taken for one.
 pub(crate) fn crosses(
     elements: &Elements<'_>,
     places: [&Vector; 2],

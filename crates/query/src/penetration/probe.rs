@@ -92,8 +92,8 @@ pub(crate) trait Probe {
         ControlFlow::Continue(None)
     }
 
-    /// Returns a length such that b meets the surface of a after every shorter shift, as parts of b are on both
-    /// sides of it; 0 if none is known. `way` is the direction of a shift that separates the things.
+    /// Returns a length such that b meets the surface of a after every shorter shift, as parts of b are on
+    /// both sides of it; 0 if none is known. `way` is the direction of a shift that separates the things.
     fn across(&mut self, way: Vector, contacts: &ContactSurvey) -> ControlFlow<(), f64> {
         let _ = (way, contacts);
         ControlFlow::Continue(0.0)

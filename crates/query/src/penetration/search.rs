@@ -40,10 +40,13 @@ pub(crate) fn search<P: Probe>(
         ControlFlow::Break(()) => ControlFlow::Break(()),
     };
     let Search { probe, best, mut lower, contacts, .. } = search;
-    // A deep place contradicts the shift by more than holes between discs explain: it is outside one of the
-    // things.
-    if lower > best.length * (1.0 + FINE) + probe.slack() {
+    let excess = lower - best.length;
+    if excess > probe.slack() {
+        // A deep place that contradicts the shift by so much is outside one of the things.
         lower = contacts.least;
+    } else if excess > best.length * FINE {
+        // Holes between discs explain it.
+        lower = (best.length - excess).max(contacts.least);
     }
     Bounds { lower: lower.min(best.length), shift: best.vector(), complete: flow.is_continue() }
 }

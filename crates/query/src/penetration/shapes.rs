@@ -165,7 +165,8 @@ impl Probe for ShapeProbe<'_, '_> {
         let normals = contacts.some.iter().map(|contact| contact.normals[0]);
         let ways = [way].into_iter().chain(self.solid.axes).chain(normals).flat_map(|way| [way, -way]);
         let working = (self.level, &mut self.memory.crossings, &mut *self.scratch);
-        let found = across(self.elements, self.solid, ways, working, &mut self.spent.evaluations);
+        let asked = (&self.budget, &mut self.spent.evaluations);
+        let found = across(self.elements, self.solid, ways, working, asked)?;
         ControlFlow::Continue(if found > 0.0 { found + self.elements.margin } else { 0.0 })
     }
 

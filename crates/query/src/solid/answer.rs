@@ -73,11 +73,14 @@ pub struct ShapeDistance {
 /// A contact of a shape with the surface of a scan, for a physics solver. World coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ShapeContact {
-    /// A point of the surface. The deepest point of the shape below it is `depth` against the normal.
+    /// A point of the surface. The deepest point of the shape below its disc is `depth` against the normal.
+    /// At the end of a sheet the normal is the way past the end, and the shape is clear of all of the sheet
+    /// after `depth`, so there may be nothing of the shape below this point.
     pub point: [f64; 3],
     /// The unit normal of the surface, in the direction in which the shape moves out.
     pub normal: [f64; 3],
-    /// The penetration depth along the normal. Negative for a gap within the margin.
+    /// The penetration depth along the normal. Negative for a gap within the margin, or within a twentieth of
+    /// the local radius, the thickness of discs.
     pub depth: f64,
     /// A number that the contact keeps from frame to frame if a [hint](crate::ShapeHint) is used;
     /// otherwise the number of the measured point there. No two contacts of a manifold share one.

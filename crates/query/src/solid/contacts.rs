@@ -61,7 +61,7 @@ pub(crate) fn contacts(
             let _whole = near.search(level, elements.margin, search);
             found.arrange();
         }
-        for &(i, place) in ends.settle(elements, solid, level, (found, scratch)) {
+        for &(i, place) in ends.settle(elements, (solid, &sides), level, (found, scratch)) {
             selected.places.push(Met { place, i, is_past_end: true });
         }
         let mut selection = Selection::new((elements, solid, &sides), level, found, selected);

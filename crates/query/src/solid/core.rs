@@ -218,18 +218,6 @@ impl<'a> Solid<'a> {
         self.radius + of_core
     }
 
-    /// A length: every plane through [`Self::inside`] contains a line in the shape that has it on both sides of
-    /// that place.
-    pub(crate) fn width(&self) -> f64 {
-        let is_even = matches!(self.core, Core::Round([below, above]) if below == above);
-        if self.is_box() || is_even {
-            // A plane crosses the rectangle that the two longer axes span.
-            let [x, y, z] = self.half.into();
-            return self.radius + x.min(y).max(x.max(y).min(z));
-        }
-        self.depth(&self.inside).map_or(0.0, |(depth, _)| depth)
-    }
-
     fn ends(&self) -> [Vector; 2] {
         let along = self.axes[0] * self.half.x;
         [self.centre - along, self.centre + along]

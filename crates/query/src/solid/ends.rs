@@ -12,6 +12,7 @@ use crate::solid::candidates::{Candidate, CandidateBlocks, Slab, single};
 use crate::solid::core::Solid;
 use crate::solid::elements::{Element, Elements};
 use crate::solid::place::{PRECISION, Place, disc_gap, from_behind, place_at};
+use crate::solid::sides::Sides;
 use crate::solid::touch::touch;
 
 type Vector = Vector3<f64>;
@@ -77,6 +78,7 @@ struct Near {
 struct Sheet<'s> {
     elements: &'s Elements<'s>,
     solid: &'s Solid<'s>,
+    sides: &'s Sides,
     /// A disc at the border, with its local radius.
     border: FlatDisc,
     band: f64,
@@ -128,7 +130,7 @@ impl SheetEnds {
     pub(crate) fn settle<'s>(
         &'s mut self,
         elements: &Elements<'_>,
-        solid: &Solid<'_>,
+        (solid, sides): (&Solid<'_>, &Sides),
         level: Level,
         (found, scratch): (&mut CandidateBlocks, &mut ViewScratch),
     ) -> &'s [(usize, Place)] {
@@ -136,7 +138,7 @@ impl SheetEnds {
         let mut sheets = 0;
         for _ in 0..BORDERS {
             let Some(border) = found.first_border().filter(|_| sheets < SHEETS) else { break };
-            sheets += u32::from(self.leave(elements, solid, (level, scratch), (found, border)));
+            sheets += u32::from(self.leave(elements, (solid, sides), (level, scratch), (found, border)));
         }
         &self.places
     }
@@ -146,7 +148,7 @@ impl SheetEnds {
     fn leave(
         &mut self,
         elements: &Elements<'_>,
-        solid: &Solid<'_>,
+        (solid, sides): (&Solid<'_>, &Sides),
         (level, scratch): (Level, &mut ViewScratch),
         (found, border): (&mut CandidateBlocks, Candidate),
     ) -> bool {
@@ -184,15 +186,17 @@ impl SheetEnds {
             let ball = Solid::ball((sheet.before(way), BALL * band));
             touch(&bare, ball.as_ref(), None, (level, scratch)).verdict.is_separated()
         };
-        let mut leaving = Sheet { elements, solid, border, band, discs: &self.discs }.leave(found, &mut ends);
+        let mut leaving =
+            Sheet { elements, solid, sides, border, band, discs: &self.discs }.leave(found, &mut ends);
         if leaving.is_none() && connect(&mut self.discs, &border) {
-            leaving = Sheet { elements, solid, border, band, discs: &self.discs }.leave(found, &mut ends);
+            leaving =
+                Sheet { elements, solid, sides, border, band, discs: &self.discs }.leave(found, &mut ends);
         }
         for near in &self.discs {
             found.look_at(near.candidate);
         }
         let Some((way, is_past)) = leaving else { return true };
-        let sheet = Sheet { elements, solid, border, band, discs: &self.discs };
+        let sheet = Sheet { elements, solid, sides, border, band, discs: &self.discs };
         for &Near { candidate, i, disc } in sheet.discs {
             let is_inner = !elements.is_at_border(i);
             let place = if is_past { sheet.past(&disc, &way) } else { sheet.beside(&disc, &way, is_inner) };
@@ -367,7 +371,7 @@ impl Sheet<'_> {
             let own = (near.i, found.sign(near.candidate));
             let place = || {
                 let place = place_at(self.elements, self.solid, own.0, own.1)?;
-                let is_open = !self.elements.placed.scan().is_oriented();
+                let is_open = self.sides.are_open(self.elements, own.0);
                 let other = is_open.then(|| from_behind(self.elements, self.solid, own, &place)).flatten();
                 other.unwrap_or(Some(place))
             };

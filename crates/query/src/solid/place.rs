@@ -62,16 +62,19 @@ pub(crate) fn place_at(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sig
     place.filter(|it| it.depth >= solid.radius - most)
 }
 
-/// A shape moves out of a disc to the other side if it reaches so many times as far behind the disc as before it.
+/// A shape moves out of a disc to the other side if it reaches so many times as far behind the disc as before
+/// it.
 const BEYOND: f64 = 4.0;
 
 /// A place that is less deep is not wrong by much, in local radii.
 const SHALLOW: f64 = 0.05;
 
-/// Checks on which side of point `i` a shape moves out that has this place there. A shape may be almost or all
-/// behind a disc although its centre is before the plane of the disc, as the foot of a long body is behind the
-/// steps of stairs that it has passed. Returns the place on the other side then, and `None` within if there is
-/// none. A place that is less deep than the local radius stays if the shape touches the disc.
+/// Checks on which side of point `i` a shape moves out that has this place there.
+///
+/// A shape may be almost or all behind a disc although its centre is before the plane of the disc, as the
+/// foot of a long body is behind the steps of stairs that it has passed. Returns the place on the other
+/// side then, and `None` within if there is none. A place that is less deep than the local radius stays if
+/// the shape touches the disc.
 pub(crate) fn from_behind(
     elements: &Elements<'_>,
     solid: &Solid<'_>,
@@ -82,25 +85,19 @@ pub(crate) fn from_behind(
     let (depth, is_deep) = (place.depth, place.depth > band);
     let is_told = if elements.margin > 0.0 { depth > SHALLOW * band } else { is_deep };
     let least = if is_deep { depth / BEYOND } else { 0.0 };
-    if !is_told || !elements.is_disc(i) || before(solid, place) >= least {
+    if !is_told || !elements.is_disc(i) {
+        return None;
+    }
+    // Mostly the shape reaches far enough above some place of the disc, so nothing more has to be computed.
+    let (centre, radius) = (elements.position(i), f64::from(elements.arrays.discs.get(i)));
+    let (out, towards) = (elements.normal(i) * sign, solid.inside - centre);
+    let across = towards - out * out.dot(&towards);
+    let inwards = || centre + across * (radius / across.norm()).min(1.0);
+    if solid.reach(&place.point, &out) >= least || solid.reach(&inwards(), &out) >= least {
         return None;
     }
     let other = place_at(elements, solid, i, -sign);
     other.is_none_or(|other| other.depth < least).then_some(other)
-}
-
-/// A lower bound on how far a shape reaches before the disc, where it is deepest behind it.
-fn before(solid: &Solid<'_>, place: &Place) -> f64 {
-    if !solid.is_box() || solid.radius > 0.0 {
-        return solid.radius - solid.distance_bound(&place.point);
-    }
-    // Along the line through both places, up to the face where it leaves the box.
-    let from = place.point - solid.centre;
-    let leaves = |k: usize| {
-        let [at, rise] = [from, place.normal].map(|v| solid.axes[k].dot(&v));
-        if rise.abs() > 1e-9 { (solid.half[k] - at * rise.signum()) / rise.abs() } else { f64::INFINITY }
-    };
-    (0..3).map(leaves).fold(f64::INFINITY, f64::min)
 }
 
 /// An upper bound on the depth over the disc of point `i`, whose normal in the direction in which the shape
@@ -178,10 +175,17 @@ pub(crate) fn over_discs<L: Lane>(solid: &Solid<'_>, discs: &Discs<L>) -> Over<L
 }
 
 /// The place of a shape that is only beside the disc of point `i`, within its thickness: no part of the
-/// shape is over the disc, or that part is far above it. `None` if they are apart.
-pub(crate) fn place_beside(elements: &Elements<'_>, solid: &Solid<'_>, i: usize, sign: f64) -> Option<Place> {
+/// shape is over the disc, or that part is far above it. `None` if they are apart. If the side `is_open`, the
+/// shape moves out to where it is.
+pub(crate) fn place_beside(
+    elements: &Elements<'_>,
+    solid: &Solid<'_>,
+    (i, sign, is_open): (usize, f64, bool),
+) -> Option<Place> {
     let normal = elements.normal(i) * sign;
     let gap = near_gap(elements, solid, i)?;
+    let is_behind = is_open && normal.dot(&(gap.on_core - gap.on_disc)) < 0.0;
+    let normal = if is_behind { -normal } else { normal };
     Some(Place { point: gap.on_disc, normal, depth: solid.radius - gap.distance })
 }
 

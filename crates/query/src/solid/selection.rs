@@ -108,7 +108,8 @@ impl<'s, 'a> Selection<'s, 'a> {
     fn take_beside(&mut self) {
         let places = self.found.missed().filter_map(|it| {
             let i = self.found.point(it);
-            let place = place_beside(self.elements, self.solid, i, self.found.sign(it))?;
+            let own = (i, self.found.sign(it), self.sides.are_open(self.elements, i));
+            let place = place_beside(self.elements, self.solid, own)?;
             Some(Met { place, i, is_past_end: false })
         });
         if let Some(deepest) = places.max_by(Met::deeper) {
@@ -149,8 +150,8 @@ impl<'s, 'a> Selection<'s, 'a> {
         });
     }
 
-    /// Keeps the place of a candidate, and returns its number. Removes the candidate if it has none, or if the
-    /// shape is behind its disc.
+    /// Keeps the place of a candidate, and returns its number. Removes the candidate if it has none, or if
+    /// the shape is behind its disc.
     fn keep(&mut self, candidate: Candidate, place: Option<Place>) -> Option<usize> {
         let (i, sign) = (self.found.point(candidate), self.found.sign(candidate));
         let other = place
@@ -238,6 +239,7 @@ impl<'s, 'a> Selection<'s, 'a> {
                 return;
             }
             if let Some(own) = self.place(candidate)
+                && self.found.place(candidate).is_some()
                 && continues(&self.scratch.places[own])
                 && self.is_free(own)
             {

@@ -199,7 +199,7 @@ impl Shape<'_> {
             Self::Sphere { centre, .. } => sum_of_zeros(centre),
             Self::Capsule { ends: [p, q], .. } => sum_of_zeros(p) + sum_of_zeros(q),
             Self::Box { pose, .. } | Self::Cylinder { pose, .. } | Self::Cone { pose, .. } => {
-                sum_of_zeros(pose.translation())
+                sum_of_zeros(pose.translation()) + pose.rotation().sum() * 0.0
             }
             Self::Triangle { points: [p, q, r], .. } => sum_of_zeros(p) + sum_of_zeros(q) + sum_of_zeros(r),
             Self::Hull { points, .. } => points.iter().map(|&p| sum_of_zeros(p)).sum(),

@@ -3,7 +3,7 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::{CollideOptions, Detail, Placed, Scratch, Shape, ShapePlan, Target};
+use nearmiss_query::{CollideOptions, Detail, Placed, Scratch, Shape, ShapeHint, ShapePlan, Target};
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use rand::RngExt;
 
@@ -178,6 +178,13 @@ fn what_is_apart_is_nowhere_deep() {
                 let deepest = contacts.first().unwrap_or_else(|| panic!("{name}: {shape:?} has no contact"));
                 assert!(deepest.depth < 0.1 * r, "{name}: {shape:?}, {} apart: {contacts:?}", found.upper);
                 compared += 1;
+                // The hint keeps the side on which the shape is.
+                let hint = &mut ShapeHint::default();
+                for _ in 0..2 {
+                    target.contacts_hinted(&shape, hint, &mut contacts, scratch);
+                    let is_deep = contacts.iter().any(|contact| contact.depth > 0.1 * r);
+                    assert!(!is_deep, "{name}: {shape:?}, {} apart, hinted: {contacts:?}", found.upper);
+                }
             }
         }
         assert!(compared > 1000, "{compared} of {name}");
@@ -202,6 +209,8 @@ fn feet_on_steps_leave_them_upwards() {
         let foot = [x, rng.random_range(0.3..0.7), 0.17 * step + radius - depth];
         let head = [foot[0] + rng.random_range(-0.1..0.1), foot[1], foot[2] + 1.2];
         target.contacts(&Shape::Capsule { ends: [foot, head], radius }, &mut contacts, scratch);
+        // Less than the thickness of a disc may lie between the foot and its contact.
+        assert!(depth < 0.1 * r || contacts.first().is_some_and(|it| it.normal[2] > 0.0), "{contacts:?}");
         for contact in &contacts {
             assert!(contact.depth < depth + r, "{depth} in step {step}, {x}: {contact:?}");
             most = most.max(contact.depth - depth);
