@@ -4,7 +4,6 @@
 //! Each ball can give one along the way from its centre.
 
 use fearless_simd::Level;
-use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointKind;
 
 use crate::ask::options::Detail;
@@ -21,8 +20,6 @@ use crate::solid::probe::is_far;
 use crate::solid::refine::refine;
 use crate::solid::selection::{Met, Selected, Selection};
 use crate::solid::sides::Sides;
-
-type Vector = Vector3<f64>;
 
 /// Evaluations that move the deepest contact over the surface.
 const SLIDES: u32 = 3;
@@ -46,9 +43,7 @@ pub(crate) fn contacts(
     out.clear();
     let (mut points, mut bands, mut at_ends) = ([0; MOST], [0.0; MOST], [false; MOST]);
     if let Some(solid) = solid {
-        let own = hint.as_deref().and_then(|hint| hint.centre);
-        let own = own.map(|own| Vector::from(elements.placed.stored_to_world().apply_inverse(own)));
-        let sides = Sides::new(elements, own.unwrap_or(solid.inside), hint.as_deref());
+        let sides = Sides::new(elements, solid, hint.as_deref());
         let Candidates { found, selected, ends } = candidates;
         found.clear();
         selected.places.clear();
@@ -93,6 +88,7 @@ pub(crate) fn contacts(
 
 #[cfg(test)]
 mod tests {
+    use nearmiss_geometry::nalgebra::Vector3;
     use nearmiss_geometry::{PointCloud, Pose};
     use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
     use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
@@ -109,10 +105,12 @@ mod tests {
     use crate::solid::selection::LEVEL;
     use crate::solid::shape::Shape;
 
+    type Vector = Vector3<f64>;
+
     /// The places of all discs and balls, before and behind the surface, and those at discs that the shape is
     /// behind of.
     fn all_places(elements: &Elements<'_>, solid: &Solid<'_>) -> [Vec<Met>; 3] {
-        let sides = Sides::new(elements, solid.inside, None);
+        let sides = Sides::new(elements, solid, None);
         let mut all = [Vec::new(), Vec::new(), Vec::new()];
         for i in 0..elements.placed.scan().len() {
             let (normal, radius) = (elements.normal(i), f64::from(elements.arrays.discs.get(i)));

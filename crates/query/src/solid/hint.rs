@@ -37,7 +37,8 @@ impl ShapeHint {
     }
 
     /// Sets the point of the world whose side of a surface counts instead of the shape's centre, for
-    /// example the centre of a body of which the shape is a part. `None` is the shape's centre.
+    /// example the centre of a body of which the shape is a part. `None` is the shape's centre. A point
+    /// outside of the shape decides alone: the shape may be all behind a surface that the body crosses.
     pub fn set_centre(&mut self, centre: Option<[f64; 3]>) {
         self.centre = centre;
     }

@@ -85,15 +85,15 @@ pub(crate) fn from_behind(
     let (depth, is_deep) = (place.depth, place.depth > band);
     let is_told = if elements.margin > 0.0 { depth > SHALLOW * band } else { is_deep };
     let least = if is_deep { depth / BEYOND } else { 0.0 };
-    if !is_told || !elements.is_disc(i) {
+    // Mostly the shape reaches far enough above some place of the disc, so nothing more has to be computed.
+    if !is_told || solid.reach(&place.point, &place.normal) >= least || !elements.is_disc(i) {
         return None;
     }
-    // Mostly the shape reaches far enough above some place of the disc, so nothing more has to be computed.
     let (centre, radius) = (elements.position(i), f64::from(elements.arrays.discs.get(i)));
     let (out, towards) = (elements.normal(i) * sign, solid.inside - centre);
     let across = towards - out * out.dot(&towards);
-    let inwards = || centre + across * (radius / across.norm()).min(1.0);
-    if solid.reach(&place.point, &out) >= least || solid.reach(&inwards(), &out) >= least {
+    let inwards = across * (radius / across.norm()).min(1.0);
+    if solid.reach(&(centre + inwards), &out) >= least {
         return None;
     }
     let other = place_at(elements, solid, i, -sign);

@@ -3,6 +3,7 @@
 use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::leaf::disc_triangle::FlatDisc;
+use crate::solid::core::Solid;
 use crate::solid::elements::{Element, Elements};
 use crate::solid::hint::{MOST, ShapeHint};
 
@@ -26,14 +27,19 @@ pub(crate) struct Sides {
     pub(crate) is_oriented: bool,
     /// The point whose side of a surface is that of the shape.
     pub(crate) inside: Vector,
+    /// `true` if that point is outside of the shape, which is a part of a greater body then.
+    is_part: bool,
     /// The points and normals of the contacts of the last frame.
     known: [(Vector, Vector); MOST],
     count: usize,
 }
 
 impl Sides {
-    pub(crate) fn new(elements: &Elements<'_>, inside: Vector, hint: Option<&ShapeHint>) -> Self {
+    pub(crate) fn new(elements: &Elements<'_>, solid: &Solid<'_>, hint: Option<&ShapeHint>) -> Self {
         let frame = elements.placed.stored_to_world();
+        let given = hint.and_then(|hint| hint.centre).map(|given| frame.apply_inverse(given).into());
+        let is_part = given.is_some_and(|given| solid.distance_bound(&given) > solid.radius);
+        let inside = given.unwrap_or(solid.inside);
         let is_oriented = elements.placed.scan().is_oriented();
         let (mut known, mut count) = ([(Vector::zeros(), Vector::zeros()); MOST], 0);
         for contact in hint.into_iter().flat_map(ShapeHint::contacts) {
@@ -41,7 +47,7 @@ impl Sides {
                 (frame.apply_inverse(contact.point).into(), frame.rotate_inverse(contact.normal).into());
             count += 1;
         }
-        Self { is_oriented, inside, known, count }
+        Self { is_oriented, inside, is_part, known, count }
     }
 
     /// Returns `true` if contacts of the last frame decide about discs near them.
@@ -49,9 +55,10 @@ impl Sides {
         !self.is_oriented && self.count > 0
     }
 
-    /// Returns `true` if neither the scan nor a contact of the last frame decides about point `i`.
+    /// Returns `true` if neither the scan, nor a contact of the last frame, nor a greater body decides about
+    /// point `i`.
     pub(crate) fn are_open(&self, elements: &Elements<'_>, i: usize) -> bool {
-        if self.is_oriented {
+        if self.is_oriented || self.is_part {
             return false;
         }
         let disc = || match elements.element(i) {
