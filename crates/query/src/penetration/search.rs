@@ -124,8 +124,8 @@ impl<P: Probe> Search<'_, P> {
         self.lower = self.lower.max(self.contacts.least - self.probe.rounding());
         self.leave_contacts()?;
         self.try_directions()?;
-        self.look_across()?;
         self.raise()?;
+        self.look_across()?;
         for _ in 0..ROUNDS {
             let before = self.best.length;
             self.follow_contacts()?;
@@ -137,8 +137,8 @@ impl<P: Probe> Search<'_, P> {
         self.bisect(FINE)?;
         self.settle()?;
         self.lengthen()?;
-        self.look_across()?;
         self.raise()?;
+        self.look_across()?;
         let enough = ENOUGH * self.enough();
         let Some(deepest) = self.deepest.filter(|_| self.lower < enough) else {
             return ControlFlow::Continue(());
