@@ -72,9 +72,9 @@ const SHALLOW: f64 = 0.05;
 /// Checks on which side of point `i` a shape moves out that has this place there.
 ///
 /// A shape may be almost or all behind a disc although its centre is before the plane of the disc, as the
-/// foot of a long body is behind the steps of stairs that it has passed. Returns the place on the other
-/// side then, and `None` within if there is none. A place that is less deep than the local radius stays if
-/// the shape touches the disc.
+/// foot of a long body is behind the steps of stairs that it has passed. Returns `None` if the place counts,
+/// `Some(Some(place))` if another place on the other side counts instead, and `Some(None)` if neither does.
+/// While the shape touches the disc, a place counts up to a depth of the local radius.
 pub(crate) fn from_behind(
     elements: &Elements<'_>,
     solid: &Solid<'_>,
